@@ -1,0 +1,48 @@
+# The workflow as verbs. Everything is installed into .venv, once: a stamp file says with which extra.
+PYTHON ?= python3
+SILHOUETTES ?=
+BIN := .venv/bin
+INSTALL := $(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test check bench clean
+
+help: ## this list
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-6s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+demo: .venv/installed-base ## build a mesh of every silhouette in examples/ and draw how it came about
+	@$(BIN)/python -m agents.solve examples --out out
+	@echo "The pictures are in out/: open the one named last above."
+
+test: .venv/installed-dev ## run the tests
+	@$(BIN)/python -m pytest -n auto --maxprocesses=2
+
+check: .venv/installed-dev ## lint, formatting, types, then the tests
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check .
+	@$(BIN)/mypy
+	@$(MAKE) --no-print-directory test
+
+bench: .venv/installed-bench ## measure the speed and quality; SILHOUETTES=DIR measures on that folder too
+	@$(BIN)/python -m benchmarks.run $(if $(SILHOUETTES),--silhouettes "$(SILHOUETTES)")
+
+clean: ## remove what was generated; .venv stays
+	rm -rf out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find . -path ./.venv -prune -o -name __pycache__ -type d -exec rm -rf {} +
+
+.venv/created:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || { \
+	  echo "AutoPoly needs Python 3.11 or newer; $(PYTHON) is $$($(PYTHON) --version 2>/dev/null || echo missing)." \
+	       "Name another one: make PYTHON=python3.12 $(MAKECMDGOALS)" >&2; exit 1; }
+	@$(PYTHON) -m venv .venv
+	@touch $@
+
+.venv/installed-base: pyproject.toml constraints.txt | .venv/created
+	@echo "Installing AutoPoly into .venv ..."
+	@$(INSTALL) -e .
+	@touch $@
+
+.venv/installed-%: pyproject.toml constraints.txt | .venv/created
+	@echo "Installing AutoPoly with what '$*' needs into .venv ..."
+	@$(INSTALL) -e '.[$*]'
+	@touch $@

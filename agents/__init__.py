@@ -1,0 +1,1 @@
+"""The players: everything that chooses actions. Search, networks, RL policies and baselines."""

@@ -1,0 +1,29 @@
+"""The errors AutoPoly raises on purpose. Each message says what was given, what was expected and what to do."""
+
+
+class AutoPolyError(Exception):
+    """Base of every error raised on purpose by this project."""
+
+
+class SilhouetteError(AutoPolyError):
+    """An image that cannot serve as a target silhouette."""
+
+
+class MeshError(AutoPolyError):
+    """Vertices and faces that do not form a valid polygon mesh."""
+
+
+class IllegalActionError(AutoPolyError):
+    """A topological operator asked to work where it may not."""
+
+
+class SequenceError(AutoPolyError):
+    """A construction sequence that cannot be read or replayed."""
+
+
+class ConfigError(AutoPolyError):
+    """A setting that is unknown or out of range."""
+
+
+class OutputError(AutoPolyError):
+    """A result that cannot be written where it was asked to go."""

@@ -1,0 +1,1 @@
+"""The workshop: scripts with side effects. Datasets, training, evaluation, comparison."""
