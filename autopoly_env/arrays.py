@@ -1,0 +1,10 @@
+"""Names for the array types that the signatures of this project use."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+UIntArray = NDArray[np.uint64]
+BoolArray = NDArray[np.bool_]
+ByteArray = NDArray[np.uint8]

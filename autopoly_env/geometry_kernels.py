@@ -1,0 +1,83 @@
+"""Numba kernels for the plane geometry of meshes: signed face areas and pairs of edges that intersect."""
+
+import numpy as np
+
+from autopoly_env.arrays import FloatArray, IntArray
+from autopoly_env.jit import kernel
+
+# Forward error bound of the 2x2 orientation determinant (Shewchuk 1997, "Adaptive precision floating-point
+# arithmetic and fast robust geometric predicates", ccwerrboundA).
+_ORIENTATION_ERROR = (3.0 + 16.0 * 2.0**-53) * 2.0**-53
+UNCERTAIN = 2
+
+
+@kernel
+def orientation(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> int:
+    """Sign of the area of triangle abc: 1, 0, -1, or UNCERTAIN where rounding decides."""
+    left = (ax - cx) * (by - cy)
+    right = (ay - cy) * (bx - cx)
+    det = left - right
+    bound = _ORIENTATION_ERROR * (abs(left) + abs(right))
+    if det > bound:
+        return 1
+    if det < -bound:
+        return -1
+    if bound == 0.0:
+        return 0
+    return UNCERTAIN
+
+
+@kernel
+def _segments_meet(p: FloatArray, a: int, b: int, c: int, d: int) -> int:
+    """1 where the closed segments ab and cd share a point, 0 where not, UNCERTAIN where rounding decides."""
+    ax, ay, bx, by = p[a, 0], p[a, 1], p[b, 0], p[b, 1]
+    cx, cy, dx, dy = p[c, 0], p[c, 1], p[d, 0], p[d, 1]
+    if max(ax, bx) < min(cx, dx) or max(cx, dx) < min(ax, bx):
+        return 0
+    if max(ay, by) < min(cy, dy) or max(cy, dy) < min(ay, by):
+        return 0
+    side_c = orientation(ax, ay, bx, by, cx, cy)
+    side_d = orientation(ax, ay, bx, by, dx, dy)
+    if side_c == side_d and (side_c == 1 or side_c == -1):
+        return 0
+    side_a = orientation(cx, cy, dx, dy, ax, ay)
+    side_b = orientation(cx, cy, dx, dy, bx, by)
+    if side_a == side_b and (side_a == 1 or side_a == -1):
+        return 0
+    if side_a == UNCERTAIN or side_b == UNCERTAIN or side_c == UNCERTAIN or side_d == UNCERTAIN:
+        return UNCERTAIN
+    return 1  # collinear segments come here too, and their boxes overlap, so they touch
+
+
+@kernel
+def count_crossings(points: FloatArray, edges: IntArray) -> tuple[int, int]:
+    """Pairs of edges that share no vertex and meet: (certain ones, ones that rounding decides)."""
+    certain, uncertain = 0, 0
+    for i in range(edges.shape[0]):
+        a, b = edges[i, 0], edges[i, 1]
+        for j in range(i):
+            c, d = edges[j, 0], edges[j, 1]
+            if a == c or a == d or b == c or b == d:
+                continue
+            meet = _segments_meet(points, a, b, c, d)
+            if meet == 1:
+                certain += 1
+            elif meet == UNCERTAIN:
+                uncertain += 1
+    return certain, uncertain
+
+
+@kernel
+def face_areas(points: FloatArray, corners: IntArray, offsets: IntArray) -> FloatArray:
+    """Signed area (F,) of every face; face f has the vertices corners[offsets[f]:offsets[f+1]]."""
+    n_faces = offsets.shape[0] - 1
+    areas = np.empty(n_faces)
+    for face in range(n_faces):
+        first, last = offsets[face], offsets[face + 1]
+        ox, oy = points[corners[first], 0], points[corners[first], 1]
+        area = 0.0
+        for k in range(first + 1, last - 1):
+            i, j = corners[k], corners[k + 1]
+            area += (points[i, 0] - ox) * (points[j, 1] - oy) - (points[j, 0] - ox) * (points[i, 1] - oy)
+        areas[face] = 0.5 * area
+    return areas
