@@ -1,0 +1,217 @@
+"""`ConstructionSequence`: how a mesh was built, step by step; it replays bit for bit without a target."""
+
+import json
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from autopoly_env.actions import STOP, Action
+from autopoly_env.errors import AutoPolyError, OutputError, SequenceError
+from autopoly_env.mesh import PolyMesh
+from autopoly_env.operators import OPERATORS, Choice, Operator
+from autopoly_env.sequence_file import Score, Step, check_score, dump_json, parse_json, plain_json
+from autopoly_env.sequence_ids import choice_ids, choice_indices, element_ids, element_index, element_words
+
+__all__ = ["ConstructionSequence", "Step"]
+
+
+@dataclass(frozen=True)
+class ConstructionSequence:
+    """A start mesh and the steps taken from it. What comes from outside is read with `load` or `from_json`."""
+
+    settings: dict[str, Any]  # anything JSON knows: what a reader needs in order to understand the scores
+    start: PolyMesh
+    start_score: Score
+    steps: tuple[Step, ...] = ()
+
+    @classmethod
+    def record(
+        cls,
+        settings: dict[str, Any],
+        start: PolyMesh,
+        start_score: Score,
+        transitions: Iterable[tuple[Action, Choice | None, PolyMesh, Score]],
+    ) -> "ConstructionSequence":
+        """The sequence of `transitions` (action, its choice, the mesh after it, that mesh's score) from `start`.
+
+        A choice of None is recorded as what the operator chooses by default. STOP is left out: it changes
+        nothing. Raises SequenceError if a mesh is not what its action makes of the one before it, moved
+        vertices aside.
+        """
+        mesh, steps = start, []
+        for number, (action, choice, after, score) in enumerate(transitions, 1):
+            try:
+                if action != STOP:
+                    steps.append(_record_step(mesh, action, choice, after, _plain(score)))
+                elif not np.array_equal(after.vertices, mesh.vertices):
+                    raise SequenceError("the mesh changed under a stop; record what moved it")
+            except AutoPolyError as error:
+                raise SequenceError(f"step {number}: {error}") from None
+            check_score(score, f"step {number}")
+            mesh = after
+        check_score(start_score, "start")
+        return cls(_plain(settings), start, _plain(start_score), tuple(steps))
+
+    @cached_property
+    def _meshes(self) -> tuple[PolyMesh, ...]:
+        meshes = [self.start]
+        for number, step in enumerate(self.steps, 1):
+            try:
+                meshes.append(_replay_step(meshes[-1], step))
+            except AutoPolyError as error:
+                where = f"step {number}, {step.operator} {element_words(step)}"
+                raise SequenceError(f"{where}: {error}") from None
+        return tuple(meshes)
+
+    def meshes(self) -> list[PolyMesh]:
+        """The start mesh and the mesh after each step. Raises SequenceError naming the step that fails."""
+        return list(self._meshes)
+
+    def final(self) -> PolyMesh:
+        """The mesh after the last step."""
+        return self._meshes[-1]
+
+    def trim(self, n: int) -> "ConstructionSequence":
+        """The first n steps. Raises SequenceError if there are not as many."""
+        if not 0 <= n <= len(self.steps):
+            raise SequenceError(f"cannot trim {len(self.steps)} steps to {n}; give 0..{len(self.steps)}")
+        return replace(self, steps=self.steps[:n])
+
+    def best_prefix(self) -> "ConstructionSequence":
+        """The steps up to the highest total score; of equals the shortest."""
+        totals = [score["total"] for score in (self.start_score, *(step.score for step in self.steps))]
+        return self.trim(totals.index(max(totals)))
+
+    def diff(self, other: "ConstructionSequence") -> str:
+        """What `other` has otherwise, a line each, as `what: here | there`; empty if nothing."""
+        lines = [
+            f"setting {key}: {self.settings.get(key, 'absent')} | {other.settings.get(key, 'absent')}"
+            for key in sorted(self.settings.keys() | other.settings.keys())
+            if self.settings.get(key) != other.settings.get(key)
+        ]
+        if (self.start, self.start_score) != (other.start, other.start_score):
+            lines.append(f"start: {_start_words(self)} | {_start_words(other)}")
+        for i in range(max(len(self.steps), len(other.steps))):
+            here, there = self.steps[i : i + 1], other.steps[i : i + 1]
+            if here != there:
+                lines.append(f"step {i + 1}: {_step_words(here)} | {_step_words(there)}")
+        return "\n".join(lines)
+
+    def to_json(self) -> str:
+        """The sequence as JSON text (docs/sequence-format.md). Raises SequenceError for NaN or infinity."""
+        return dump_json(self.settings, self.start, self.start_score, self.steps)
+
+    @classmethod
+    def from_json(cls, text: str) -> "ConstructionSequence":
+        """The sequence in a JSON text, replayed once as a check.
+
+        Raises SequenceError if the text is damaged, of another format, or cannot be replayed.
+        """
+        sequence = cls(*parse_json(text))
+        sequence.meshes()
+        return sequence
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write `to_json` to a file, whole or not at all. Raises OutputError if it cannot be written."""
+        target = Path(path)
+        part = target.with_name(f"{target.name}.{os.getpid()}.tmp")
+        text = self.to_json()
+        try:
+            part.write_text(text, encoding="utf-8")
+            os.replace(part, target)
+        except OSError as error:
+            part.unlink(missing_ok=True)
+            raise OutputError(f"cannot write {target} ({error.strerror}); give a writable path") from None
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> "ConstructionSequence":
+        """The sequence in a file. Raises SequenceError as `from_json` does, or if it cannot be read."""
+        try:
+            text = Path(path).read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
+            raise SequenceError(f"cannot read {path} ({reason}); give a construction sequence as saved") from None
+        try:
+            return cls.from_json(text)
+        except SequenceError as error:
+            raise SequenceError(f"{path}: {error}") from None
+
+
+def _record_step(mesh: PolyMesh, action: Action, choice: Choice | None, after: PolyMesh, score: Score) -> Step:
+    operator, element = _operator(action.operator), int(action.element)
+    if choice is None:
+        choice = operator.choose(mesh, element)
+    made = operator.apply(mesh, element, choice)
+    if made.with_vertices(after.vertices) != after:
+        raise SequenceError(f"the mesh after it is not what {action.operator} makes; record every action")
+    created, removed = _id_changes(mesh, made)
+    is_moved = (made.vertices.view(np.int64) != after.vertices.view(np.int64)).any(axis=1)
+    positions = zip(after.vertex_ids, after.vertices.tolist(), is_moved, strict=True)
+    moved = tuple((name, x, y) for name, (x, y), differs in positions if differs)
+    return Step(
+        action.operator,
+        element_ids(mesh, operator.element, element),
+        choice_ids(mesh, element, choice),
+        created,
+        removed,
+        moved,
+        score,
+    )
+
+
+def _replay_step(mesh: PolyMesh, step: Step) -> PolyMesh:
+    operator = _operator(step.operator)
+    element = element_index(mesh, operator.element, step.element)
+    made = operator.apply(mesh, element, choice_indices(mesh, operator, element, step.choice))
+    for what, expected, found in zip(
+        ("creates", "removes"), _id_changes(mesh, made), (step.created, step.removed), strict=True
+    ):
+        if found != expected:
+            raise SequenceError(f"{step.operator} {what} {expected}, but the step says {found}")
+    if not step.moved:
+        return made
+    if len({name for name, _, _ in step.moved}) < len(step.moved):
+        raise SequenceError("it moves a vertex twice; give each vertex one position")
+    vertices = made.vertices.copy()
+    for name, x, y in step.moved:
+        vertices[made.vertex_index(name)] = x, y
+    return made.with_vertices(vertices)
+
+
+def _operator(name: str) -> Operator:
+    if name not in OPERATORS:
+        raise SequenceError(f"operator {name!r} is unknown; give one of {', '.join(OPERATORS)}")
+    return OPERATORS[name]
+
+
+def _id_changes(before: PolyMesh, after: PolyMesh) -> tuple[dict[str, list[int]], dict[str, list[int]]]:
+    """The ids that came and those that went."""
+    pairs = {
+        "vertices": (before.vertex_ids, after.vertex_ids),
+        "faces": (before.face_ids, after.face_ids),
+    }
+    created = {kind: sorted(set(new).difference(old)) for kind, (old, new) in pairs.items()}
+    removed = {kind: sorted(set(old).difference(new)) for kind, (old, new) in pairs.items()}
+    return created, removed
+
+
+def _plain(values: dict[str, Any]) -> dict[str, Any]:
+    """A copy with nothing in it but what comes back from JSON."""
+    copied: dict[str, Any] = json.loads(plain_json(values))
+    return copied
+
+
+def _start_words(sequence: ConstructionSequence) -> str:
+    return f"{sequence.start}, total {sequence.start_score['total']:.2f}"
+
+
+def _step_words(steps: tuple[Step, ...]) -> str:
+    if not steps:
+        return "absent"
+    (step,) = steps
+    return f"{step.operator} {element_words(step)}, {len(step.moved)} moved, total {step.score['total']:.2f}"

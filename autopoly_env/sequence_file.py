@@ -1,0 +1,202 @@
+"""The JSON of a construction sequence: its fields and their types, and one-line errors that name the step."""
+
+import json
+import math
+from dataclasses import asdict, dataclass
+from typing import Annotated, Any, NoReturn
+
+import numpy as np
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+
+from autopoly_env.errors import MeshError, SequenceError
+from autopoly_env.mesh import PolyMesh, validate
+from autopoly_env.topology import Topology
+
+FORMAT = "autopoly-construction-sequence"
+VERSION = 1
+SCORE_KEYS = ("iou", "complexity", "self_intersections", "total")
+
+Id = Annotated[int, Field(strict=True, ge=0)]
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Score = dict[str, Annotated[int, Field(strict=True)] | Number]  # at least SCORE_KEYS
+_STRICT = ConfigDict(extra="forbid")
+
+
+@dataclass(frozen=True)
+class Step:
+    """One action and what came of it; vertices and faces go by their ids.
+
+    `element` is {"edge": [a, b]}, {"face": f}, {"face": f, "vertex": v} for a corner, {"vertex": v}, or
+    {"face": f, "sides": k} for a hole. `choice` is {"to": v} for `face_split`, {"points": [[x, y], ...],
+    "bridges": [[v, hole corner], [v, hole corner]]} for `face_hole`, otherwise None.
+    """
+
+    __pydantic_config__ = _STRICT
+
+    operator: str
+    element: dict[str, Id | list[Id]]
+    choice: dict[str, Any] | None
+    created: dict[str, list[Id]]  # {"vertices": [...], "faces": [...]}
+    removed: dict[str, list[Id]]
+    moved: tuple[tuple[Id, Number, Number], ...]  # (vertex, x, y) wherever the operator itself had put it elsewhere
+    score: Score
+
+
+@dataclass(frozen=True)
+class _Start:
+    __pydantic_config__ = _STRICT
+
+    vertices: list[tuple[Id, Number, Number]]
+    faces: list[tuple[Id, list[Id]]]
+    next_vertex_id: Id
+    next_face_id: Id
+    score: Score
+
+
+@dataclass(frozen=True)
+class _Document:
+    __pydantic_config__ = _STRICT
+
+    format: str
+    version: int
+    settings: dict[str, Any]
+    start: _Start
+    steps: tuple[Step, ...]
+
+
+@dataclass(frozen=True)
+class _Hole:
+    __pydantic_config__ = _STRICT
+
+    points: tuple[tuple[Number, Number], ...]
+    bridges: tuple[tuple[Id, Id], tuple[Id, Id]]
+
+
+_DOCUMENT = TypeAdapter(_Document)
+_HOLE = TypeAdapter(_Hole)
+_ID = TypeAdapter(Id)
+
+
+def dump_json(settings: dict[str, Any], start: PolyMesh, start_score: Score, steps: tuple[Step, ...]) -> str:
+    """The text of a sequence, a step a line. Raises SequenceError for what JSON has not, such as NaN."""
+    ids = start.vertex_ids
+    start_document = _Start(
+        [(ids[v], x, y) for v, (x, y) in enumerate(start.vertices.tolist())],
+        [(name, [ids[v] for v in face]) for name, face in zip(start.face_ids, start.faces, strict=True)],
+        start.next_vertex_id,
+        start.next_face_id,
+        start_score,
+    )
+    head = f'{{"format": "{FORMAT}", "version": {VERSION},\n "settings": {plain_json(settings)}'
+    lines = ",\n  ".join(plain_json(asdict(step)) for step in steps)
+    return f'{head},\n "start": {plain_json(asdict(start_document))},\n "steps": [\n  {lines}]}}\n'
+
+
+def parse_json(text: str) -> tuple[dict[str, Any], PolyMesh, Score, tuple[Step, ...]]:
+    """Settings, start mesh, its score and the steps of a text. Raises SequenceError if it is no sequence."""
+    try:
+        data = json.loads(text, parse_constant=_refuse_number, parse_float=_finite)
+    except (ValueError, RecursionError) as error:
+        raise SequenceError(f"not JSON ({_one_line(error)}); give a construction sequence as saved") from None
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        found = data.get("format") if isinstance(data, dict) else data
+        raise SequenceError(f"the format is {_short(found)}, not {FORMAT!r}; give a construction sequence")
+    if data.get("version") != VERSION:
+        raise SequenceError(f"the version is {_short(data.get('version'))}; this release reads version {VERSION}")
+    try:
+        document = _DOCUMENT.validate_python(data)
+    except ValidationError as error:
+        raise SequenceError(_first_defect(error)) from None
+    check_score(document.start.score, "start")
+    for number, step in enumerate(document.steps, 1):
+        check_score(step.score, f"step {number}")
+    return document.settings, _start_mesh(document.start), document.start.score, document.steps
+
+
+def parse_hole(choice: dict[str, Any]) -> _Hole:
+    """The points and bridges of a `face_hole` choice. Raises SequenceError if they are not there."""
+    try:
+        return _HOLE.validate_python(choice)
+    except ValidationError as error:
+        raise SequenceError(f"choice.{_first_defect(error)}") from None
+
+
+def parse_id(value: object, where: str) -> int:
+    """A vertex or face id. Raises SequenceError if `value` is none."""
+    try:
+        return _ID.validate_python(value)
+    except ValidationError:
+        raise SequenceError(f"{where} is {_short(value)}; give an id, an integer from 0") from None
+
+
+def check_score(score: Score, where: str) -> None:
+    """Raise SequenceError if an entry of SCORE_KEYS is missing."""
+    missing = [key for key in SCORE_KEYS if key not in score]
+    if missing:
+        raise SequenceError(f"{where}: the score has no {missing[0]!r}; give {', '.join(SCORE_KEYS)}")
+
+
+def plain_json(value: object) -> str:
+    """One line of JSON, floats with all their digits. Raises SequenceError for what JSON has not."""
+    try:
+        return json.dumps(value, allow_nan=False, default=_plain_number)
+    except (TypeError, ValueError) as error:
+        raise SequenceError(f"cannot be written as JSON ({_one_line(error)}); give finite numbers") from None
+
+
+def _plain_number(value: object) -> int | float | bool:
+    if isinstance(value, np.generic):
+        number: int | float | bool = value.item()
+        return number
+    raise TypeError(f"{type(value).__name__} is no JSON type")
+
+
+def _start_mesh(start: _Start) -> PolyMesh:
+    index = {name: v for v, (name, _, _) in enumerate(start.vertices)}
+    unknown = [(face, v) for face, names in start.faces for v in names if v not in index]
+    if unknown:
+        raise SequenceError(f"start: face {unknown[0][0]} names vertex {unknown[0][1]}, which does not exist")
+    mesh = PolyMesh(
+        np.array([(x, y) for _, x, y in start.vertices]).reshape(-1, 2),
+        Topology(len(start.vertices), tuple(tuple(index[v] for v in names) for _, names in start.faces)),
+        tuple(name for name, _, _ in start.vertices),
+        tuple(name for name, _ in start.faces),
+        start.next_vertex_id,
+        start.next_face_id,
+    )
+    try:
+        validate(mesh)
+    except MeshError as error:
+        raise SequenceError(f"start: {error}") from None
+    return mesh
+
+
+def _first_defect(error: ValidationError) -> str:
+    """The first complaint in one line: which step (from 1), which field, what is wrong."""
+    defect = error.errors(include_url=False)[0]
+    place = list(defect["loc"])
+    step = ""
+    if len(place) > 1 and place[0] == "steps":
+        step = f"step {int(place[1]) + 1}: "
+        place = place[2:]
+    return f"{step}{'.'.join(map(str, place)) or 'all of it'}: {defect['msg']}"
+
+
+def _finite(digits: str) -> float:
+    number = float(digits)
+    if not math.isfinite(number):
+        _refuse_number(digits)
+    return number
+
+
+def _refuse_number(name: str) -> NoReturn:
+    raise ValueError(f"{name} is no finite number")
+
+
+def _one_line(error: BaseException) -> str:
+    return " ".join(str(error).split())
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 40 else text[:37] + "..."
