@@ -1,0 +1,257 @@
+"""Reading images: any source becomes a small grey picture (and its opacity), however large it was."""
+
+import os
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image, UnidentifiedImageError
+
+from autopoly_env.errors import SilhouetteError
+
+FloatArray = npt.NDArray[np.float32]
+ImageSource = str | os.PathLike[str] | IO[bytes] | Image.Image | npt.NDArray[Any]
+
+MAX_SIDE = 2048  # pixels; longer pictures are reduced by an integer factor
+MAX_PIXELS = 500_000_000  # larger pictures are refused
+STRIP_PIXELS = 2**20  # pixels converted at a time, so that a huge picture never exists twice
+ROUNDING = 1e-6  # a float image may leave 0..1 by this much
+LUMA = np.array([0.299, 0.587, 0.114], dtype=np.float32)  # ITU-R BT.601, as Pillow's mode "L"
+DEEP_MODES = ("I", "F", "I;16", "I;16B", "I;16L", "I;16N")  # more than 8 bits a pixel
+EXIF_ORIENTATION = 0x0112
+# EXIF orientation -> what rights the picture: (transpose, then reverse rows, then reverse columns)
+RIGHTING = {
+    2: (False, False, True),
+    3: (False, True, True),
+    4: (False, True, False),
+    5: (True, False, False),
+    6: (True, False, True),
+    7: (True, True, True),
+    8: (True, True, False),
+}
+
+_pillow_lock = threading.Lock()
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """What was read from a source, before anything decides which part of it is the object.
+
+    `grey` (H, W) float32 in 0..1, None for a boolean array. `opacity` (H, W) float32 in 0..1: the alpha
+    channel where there is one, and a boolean array itself. `label` names the source in errors.
+    """
+
+    grey: FloatArray | None
+    opacity: FloatArray | None
+    name: str
+    label: str
+    notes: tuple[str, ...]
+
+
+def read_picture(source: ImageSource) -> Picture:
+    """Read a path, binary file object, PIL image or array; at most MAX_SIDE pixels a side come back.
+
+    Arrays are (H, W) or (H, W, 1 to 4: grey, grey + alpha, RGB, RGBA), uint8 or float in 0..1; boolean ones
+    (H, W).
+
+    Raises SilhouetteError when there is no such file, when it is no complete image or larger than MAX_PIXELS,
+    and for arrays of another shape, dtype or range.
+    """
+    if isinstance(source, (str, os.PathLike)):
+        return _read_path(Path(source))
+    if isinstance(source, Image.Image):
+        given_name = getattr(source, "filename", "")
+        name = Path(given_name).stem if isinstance(given_name, (str, os.PathLike)) else ""
+        return _read_pillow(source, name or "silhouette", "the given image")
+    if isinstance(source, np.ndarray):
+        return _read_array(source)
+    if hasattr(source, "read"):
+        given_name = getattr(source, "name", None)
+        name = Path(given_name).stem if isinstance(given_name, str) else "silhouette"
+        return _read_stream(source, name, "the given file object")
+    kind = type(source).__name__
+    raise SilhouetteError(
+        f"cannot load a {kind}; expected a path, a binary file object, a PIL image or a numpy array"
+    )
+
+
+def _read_path(path: Path) -> Picture:
+    label = repr(str(path))
+    if os.path.isdir(path):
+        raise SilhouetteError(f"{label} is a directory; expected one image file: name a file in it")
+    try:
+        stream = path.open("rb")
+    except FileNotFoundError:
+        raise SilhouetteError(f"{label} does not exist; expected an image file: check the path") from None
+    except (OSError, ValueError) as error:
+        raise SilhouetteError(
+            f"{label} cannot be opened ({_reason(error)}); expected a readable image file"
+        ) from error
+    with stream:
+        return _read_stream(stream, path.stem, label)
+
+
+def _read_stream(stream: IO[bytes], name: str, label: str) -> Picture:
+    try:
+        with _pillow_limit(None):  # the size is checked below, with our own limit and message
+            image = Image.open(stream)
+    except UnidentifiedImageError as error:
+        advice = "expected PNG, JPEG, WebP, BMP, GIF or TIFF: export it as PNG"
+        raise SilhouetteError(f"{label} is not an image that can be read; {advice}") from error
+    except Exception as error:  # a damaged header makes Pillow's readers raise almost anything
+        raise _undecodable(label, error) from error
+    return _read_pillow(image, name, label)
+
+
+def _read_pillow(image: Image.Image, name: str, label: str) -> Picture:
+    width, height = image.size
+    if width * height > MAX_PIXELS:
+        limit = f"expected at most {MAX_PIXELS // 10**6} megapixels: scale it down first"
+        raise SilhouetteError(f"{label} has {width}x{height} pixels; {limit}")
+    if width * height == 0:
+        raise _without_pixels(label, f"{width}x{height}")
+    try:
+        with _pillow_limit(MAX_PIXELS):
+            animated = getattr(image, "is_animated", False)
+            image.load()
+        levels, notes = _reduced(lambda top, end: _pillow_levels(image, top, end), width, height)
+        orientation = image.getexif().get(EXIF_ORIENTATION, 1)
+    except Exception as error:  # as above
+        raise _undecodable(label, error) from error
+    if animated:
+        notes.insert(0, "first frame of several")
+    if image.mode in DEEP_MODES:
+        levels = _stretched(levels, label, notes)
+    if orientation in RIGHTING:
+        levels = _righted(levels, *RIGHTING[orientation])
+        notes.append(f"turned upright (EXIF orientation {orientation})")
+    return Picture(levels[0], levels[1] if len(levels) == 2 else None, name, label, tuple(notes))
+
+
+def _read_array(array: npt.NDArray[Any]) -> Picture:
+    label = f"the given array of shape {array.shape} and dtype {array.dtype}"
+    if array.ndim not in (2, 3) or (array.ndim == 3 and array.shape[2] not in (1, 2, 3, 4)):
+        raise SilhouetteError(f"{label} is no image; expected (H, W) or (H, W, 1 to 4): reshape it")
+    height, width = array.shape[:2]
+    if array.size == 0:
+        raise _without_pixels(label, f"{width}x{height}")
+    is_mask = array.dtype == np.bool_
+    if is_mask and array.size != width * height:
+        raise SilhouetteError(
+            f"{label} is no mask; expected one channel: combine them, e.g. array.any(axis=2)"
+        )
+    if not (is_mask or array.dtype == np.uint8 or np.issubdtype(array.dtype, np.floating)):
+        raise SilhouetteError(
+            f"{label} has no known range; expected bool, uint8 or float in 0..1: convert it"
+        )
+    if np.issubdtype(array.dtype, np.floating):
+        low, high = float(array.min()), float(array.max())
+        if not np.isfinite(high - low):
+            raise SilhouetteError(f"{label} holds NaN or infinity; expected finite values: replace them")
+        if low < -ROUNDING or high > 1 + ROUNDING:
+            raise SilhouetteError(f"{label} spans {low:g}..{high:g}; expected floats in 0..1: rescale it")
+    levels, notes = _reduced(lambda top, end: _array_levels(array[top:end]), width, height)
+    grey = None if is_mask else levels[0]
+    opacity = levels[0] if is_mask else levels[1] if len(levels) == 2 else None
+    return Picture(grey, opacity, "silhouette", label, tuple(notes))
+
+
+def _array_levels(array: npt.NDArray[Any]) -> FloatArray:
+    """Grey (and alpha) of some rows of an array: (1 or 2, rows, W) float32 in 0..1."""
+    levels = array.astype(np.float32) / np.float32(255 if array.dtype == np.uint8 else 1)
+    if levels.ndim == 2:
+        return levels[None]
+    n_colours = levels.shape[2] - (levels.shape[2] in (2, 4))
+    grey = levels[..., :3] @ LUMA if n_colours == 3 else levels[..., 0]
+    return np.stack([grey, *np.moveaxis(levels[..., n_colours:], 2, 0)])
+
+
+def _pillow_levels(image: Image.Image, top: int, end: int) -> FloatArray:
+    """Grey (and alpha) of rows top..end of a loaded image: (1 or 2, rows, W) float32, in 0..1 unless it is
+    deep."""
+    strip = image.crop((0, top, image.width, end))
+    if strip.mode in DEEP_MODES:
+        return np.asarray(strip, dtype=np.float32)[None]
+    if strip.has_transparency_data:
+        strip = strip.convert("RGBA")
+        bands = [strip.convert("L"), strip.getchannel("A")]
+    else:
+        bands = [strip.getchannel("L") if strip.mode == "LAB" else strip.convert("L")]
+    return np.stack([np.asarray(band, dtype=np.float32) for band in bands]) / np.float32(255)
+
+
+def _reduced(
+    levels_of_rows: Callable[[int, int], FloatArray], width: int, height: int
+) -> tuple[FloatArray, list[str]]:
+    """Read strip by strip and average blocks of factor x factor pixels: (C, H, W) with sides <= MAX_SIDE,
+    notes."""
+    factor = -(-max(width, height) // MAX_SIDE)
+    rows = factor * max(1, STRIP_PIXELS // (width * factor))
+    strips = [
+        _block_means(levels_of_rows(top, min(top + rows, height)), factor) for top in range(0, height, rows)
+    ]
+    levels = np.concatenate(strips, axis=1)
+    if factor == 1:
+        return levels, []
+    size = f"{levels.shape[2]}x{levels.shape[1]}"
+    return levels, [f"reduced from {width}x{height} to {size} (blocks of {factor}x{factor} averaged)"]
+
+
+def _block_means(levels: FloatArray, factor: int) -> FloatArray:
+    """Means over factor x factor blocks of (C, H, W); the last row and column of blocks may be smaller."""
+    if factor == 1:
+        return levels
+    for axis in (1, 2):
+        starts = np.arange(0, levels.shape[axis], factor)
+        counts = np.diff(starts, append=levels.shape[axis]).astype(np.float32)
+        levels = np.add.reduceat(levels, starts, axis=axis)
+        levels /= counts[:, None] if axis == 1 else counts
+    return levels
+
+
+def _stretched(levels: FloatArray, label: str, notes: list[str]) -> FloatArray:
+    """Levels of unknown range, scaled so that they span 0..1."""
+    low, high = float(levels.min()), float(levels.max())
+    if not np.isfinite(high - low):
+        raise SilhouetteError(f"{label} holds NaN or infinity; expected finite levels: replace them")
+    if low == high or (low, high) == (0, 1):
+        return levels
+    notes.append(f"levels {low:g}..{high:g} scaled to 0..1")
+    return (levels - np.float32(low)) / np.float32(high - low)
+
+
+def _righted(levels: FloatArray, transpose: bool, reverse_rows: bool, reverse_columns: bool) -> FloatArray:
+    if transpose:
+        levels = levels.swapaxes(1, 2)
+    return levels[:, :: -1 if reverse_rows else 1, :: -1 if reverse_columns else 1]
+
+
+@contextmanager
+def _pillow_limit(n_pixels: int | None) -> Iterator[None]:
+    """Set Pillow's decompression-bomb limit, a global, for as long as the block runs."""
+    with _pillow_lock:
+        before = Image.MAX_IMAGE_PIXELS
+        Image.MAX_IMAGE_PIXELS = n_pixels
+        try:
+            yield
+        finally:
+            Image.MAX_IMAGE_PIXELS = before
+
+
+def _without_pixels(label: str, size: str) -> SilhouetteError:
+    return SilhouetteError(f"{label} has no pixels ({size}); expected at least 2: give another image")
+
+
+def _undecodable(label: str, error: Exception) -> SilhouetteError:
+    advice = "it is damaged or cut short: save or download it again"
+    return SilhouetteError(f"{label} cannot be decoded ({_reason(error)}); {advice}")
+
+
+def _reason(error: Exception) -> str:
+    """The message of an error of another library, without line breaks; its kind where it has none."""
+    return " ".join(str(getattr(error, "strerror", None) or error).split()) or type(error).__name__

@@ -1,0 +1,179 @@
+"""The target: a silhouette image as an exact, square object mask, and its area averages at any resolution."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from autopoly_env import object_mask
+from autopoly_env.errors import ConfigError, SilhouetteError
+from autopoly_env.image_files import find_images
+from autopoly_env.image_loading import ImageSource, read_picture
+
+__all__ = ["ImageSource", "Silhouette", "Target", "find_images", "load_silhouette"]
+
+BoolArray = npt.NDArray[np.bool_]
+IntArray = npt.NDArray[np.int64]
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Target:
+    """A silhouette at resolution R, with what the rasteriser and the score read off it.
+
+    Only `coverage` is given, everything else follows from it; all arrays are C-contiguous and read-only:
+
+    - `coverage` (R, R) float64 in 0..1: the share of each cell that is object.
+    - `mask` (R, R) bool: coverage >= 0.5.
+    - `row_sum`, `row_square_sum` (R, R+1) float64: prefix sums along the rows of coverage and of its square,
+      from 0, so that `row_sum[y, b] - row_sum[y, a]` is the sum over the columns a..b-1.
+    - `mask_sum` (R, R+1) int64: the same of `mask`; `n_filled`: how many cells of it are set.
+    """
+
+    coverage: FloatArray
+    mask: BoolArray = field(init=False)
+    row_sum: FloatArray = field(init=False)
+    row_square_sum: FloatArray = field(init=False)
+    mask_sum: IntArray = field(init=False)
+    n_filled: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        coverage = np.array(self.coverage, dtype=np.float64, order="C")
+        if coverage.ndim != 2 or coverage.shape[0] != coverage.shape[1] or coverage.size == 0:
+            raise SilhouetteError(f"coverage has shape {coverage.shape}; expected a square (R, R): pad it")
+        mask = coverage >= 0.5
+        object.__setattr__(self, "coverage", _read_only(coverage))
+        object.__setattr__(self, "mask", _read_only(mask))
+        object.__setattr__(self, "row_sum", _row_prefix_sums(coverage))
+        object.__setattr__(self, "row_square_sum", _row_prefix_sums(coverage**2))
+        object.__setattr__(self, "mask_sum", _row_prefix_sums(mask.astype(np.int64)))
+        object.__setattr__(self, "n_filled", int(mask.sum()))
+
+    @property
+    def resolution(self) -> int:
+        """R, in cells a side."""
+        return len(self.coverage)
+
+    def __repr__(self) -> str:
+        return f"Target(resolution={self.resolution})"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Target, (self.coverage,)  # so that an unpickled one is read-only as well
+
+
+@dataclass(frozen=True, eq=False)
+class Silhouette:
+    """A target shape: `mask` (R, R) bool, True is object, at the image's own resolution R; read-only.
+
+    It fills the unit square, x right, y down. `notes` has a short sentence for everything that loading did or
+    noticed; those that begin with "warning:" deserve to be shown.
+
+    Raises SilhouetteError for a mask that is not boolean, not square or without any object.
+    """
+
+    mask: BoolArray = field(repr=False)
+    name: str = "silhouette"
+    notes: tuple[str, ...] = ()
+    _targets: dict[int, Target] = field(default_factory=dict, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        mask = np.array(self.mask, order="C")
+        if mask.dtype != np.bool_ or mask.ndim != 2 or mask.shape[0] != mask.shape[1]:
+            given = f"the mask has shape {mask.shape} and dtype {mask.dtype}"
+            raise SilhouetteError(f"{given}; expected (R, R) and bool: use load_silhouette for other images")
+        if not mask.any():
+            raise SilhouetteError(
+                "the mask is False everywhere: there is no object; expected some True pixels"
+            )
+        object.__setattr__(self, "mask", _read_only(mask))
+
+    @property
+    def resolution(self) -> int:
+        """R, in pixels a side."""
+        return len(self.mask)
+
+    def target(self, resolution: int) -> Target:
+        """The silhouette on a grid of `resolution` x `resolution` cells: exact area averages, kept once made.
+
+        The resolution need not divide the silhouette's own, and may exceed it (which gives blocks).
+
+        Raises ConfigError for a resolution below 1.
+        """
+        if resolution < 1:
+            raise ConfigError(f"target resolution {resolution} is too small; expected at least 1: raise it")
+        if resolution not in self._targets:
+            self._targets[resolution] = Target(_area_average(self.mask, resolution))
+        return self._targets[resolution]
+
+    def pyramid(self, levels: Sequence[int]) -> tuple[Target, ...]:
+        """The targets at several resolutions, in the order given, e.g. `pyramid((8, 16, 32, 64))`."""
+        return tuple(self.target(resolution) for resolution in levels)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Silhouette, (self.mask, self.name, self.notes)  # without the targets: cheaper made than sent
+
+
+def load_silhouette(
+    source: ImageSource, *, name: str | None = None, min_component: int | None = None
+) -> Silhouette:
+    """Load an image and find the object in it.
+
+    `source` is a path, a binary file object, a PIL image or an array: (H, W) or (H, W, 1 to 4), uint8 or
+    float in 0..1, or a boolean mask (True is object). The object is what the alpha channel shows, where that
+    varies; otherwise Otsu's threshold splits the grey levels and the class of most border pixels is the
+    background. Components and holes with fewer than `min_component` pixels are removed (by default max(4,
+    2e-5 of the area); 0 keeps all), pictures larger than 2048 pixels a side are reduced by an integer factor,
+    and others than square ones are padded with background.
+
+    Raises SilhouetteError when the source cannot be read or holds no object, ConfigError for a negative
+    `min_component`.
+
+    >>> load_silhouette(np.eye(3, dtype=bool), name="diagonal")
+    Silhouette(name='diagonal', notes=('object touches the border of the image',))
+    """
+    if min_component is not None and min_component < 0:
+        raise ConfigError(
+            f"min_component is {min_component}; expected pixels, 0 or more: 0 keeps every speck"
+        )
+    picture = read_picture(source)
+    mask, how_found = object_mask.find_object(picture)
+    mask, how_cleaned = object_mask.clean(mask, min_component)
+    look = object_mask.describe(mask)
+    mask, how_padded = object_mask.square(mask)
+    notes = (*picture.notes, *how_found, *how_cleaned, *look, *how_padded)
+    return Silhouette(mask, picture.name if name is None else name, notes)
+
+
+def _area_average(mask: BoolArray, resolution: int) -> FloatArray:
+    """Mean of a (N, N) mask over each of resolution x resolution equal cells.
+
+    A cell overlaps a pixel by a whole number of 1/(N * resolution), so everything up to the last division is
+    exact integer arithmetic: a cell that is half object is exactly 0.5.
+    """
+    by_row = _cell_sums(mask.astype(np.int64), resolution)
+    return _cell_sums(by_row.T, resolution).T / mask.size
+
+
+def _cell_sums(values: IntArray, resolution: int) -> IntArray:
+    """(N, M) -> (resolution, M): sums over cells along the first axis; a pixel weighs `resolution` in all."""
+    n = len(values)
+    # the borders of the cells, in whole pixels and the rest of one
+    whole, rest = np.divmod(np.arange(resolution + 1) * n, resolution)
+    prefix = np.zeros((n + 1, values.shape[1]), dtype=np.int64)
+    np.cumsum(values, axis=0, out=prefix[1:])
+    begun_pixel = values[np.minimum(whole, n - 1)]  # past the last pixel the rest is 0
+    return np.diff(prefix[whole] * resolution + begun_pixel * rest[:, None], axis=0)
+
+
+def _row_prefix_sums(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    n_rows, n_columns = values.shape
+    sums = np.zeros((n_rows, n_columns + 1), dtype=values.dtype)
+    np.cumsum(values, axis=1, out=sums[:, 1:])
+    return _read_only(sums)
+
+
+def _read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    array.setflags(write=False)
+    return array
