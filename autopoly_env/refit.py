@@ -1,0 +1,126 @@
+"""Inverse shape estimation: move all vertices of a mesh so that its rendering matches a target.
+
+The picture is an exact function of the vertices, so this is a small least-squares problem: residual = coverage -
+target per pixel, 2V unknowns, a Jacobian that is zero off the boundary. Levenberg-Marquardt runs up the target's
+pyramid. On the coarse levels an elastic term keeps boundary edges near what they were: it carries an outline to a
+target many pixels away without tangling it, which plain gradient descent (the optional far phase) does not.
+
+Letters: V vertices, R pixels a side. The loss is the sum over pixels of (coverage - target)**2 at the finest level.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from autopoly_env import refit_kernels
+from autopoly_env.mesh import PolyMesh, Topology
+from autopoly_env.parallel import map_threads
+from autopoly_env.raster import workspace
+from autopoly_env.refit_kernels import Picture, Settings, Shape
+from autopoly_env.silhouette import Silhouette
+
+
+@dataclass(frozen=True)
+class RefitConfig:
+    """How hard a refit tries."""
+
+    first_level: int = 0  # of the pyramid's 4 levels (R/8, R/4, R/2, R), where to begin; 2 for a mesh that nearly fits
+    n_near: int = 20  # Levenberg-Marquardt steps on each level, at most
+    n_far: int = 0  # Adam steps that try to leave the optimum found, 0 for none
+    stiffness: float = 0.1  # elastic term on the second level; 0.3 of it on the next, none on the last
+    damping: float = 0.05  # absolute damping, in squared pixels: holds vertices that slide along a straight edge
+    tolerance: float = 1e-3  # relative gain of a step below which a level is done
+    keep_defects: bool = False  # allow new self-intersections and flipped faces
+
+
+FROM_AFAR = RefitConfig(n_far=60)
+LOCAL = RefitConfig(first_level=2)
+
+
+@dataclass(frozen=True)
+class RefitTarget:
+    """The pyramid that a refit climbs."""
+
+    pictures: tuple[Picture, Picture, Picture, Picture]
+
+    @classmethod
+    def of(cls, silhouette: Silhouette, resolution: int) -> "RefitTarget":
+        """Levels R/8, R/4, R/2 and R = `resolution`, none below 8 pixels (or R, if that is less)."""
+        sizes = [max(min(8, resolution), resolution // divisor) for divisor in (8, 4, 2, 1)]
+        targets = [silhouette.target(size) for size in sizes]
+        pictures = [Picture(t.coverage, t.row_sum, t.row_square_sum) for t in targets]
+        return cls((pictures[0], pictures[1], pictures[2], pictures[3]))
+
+    @property
+    def resolution(self) -> int:
+        """R of the finest level."""
+        return len(self.pictures[-1].coverage)
+
+
+@dataclass(frozen=True)
+class RefitResult:
+    """A refitted mesh, and how far it came."""
+
+    mesh: PolyMesh
+    loss_before: float
+    loss: float
+    n_evaluations: int  # renderings with derivatives
+
+
+def refit(mesh: PolyMesh, target: RefitTarget, config: RefitConfig = FROM_AFAR) -> RefitResult:
+    """Move the vertices of `mesh` to match `target`.
+
+    The result is finite, its loss is at most that of `mesh`, and unless `config.keep_defects` it has no more
+    self-intersections and no more flipped faces. Vertices that would gain nothing stay bit for bit where they are;
+    vertices off the boundary follow their neighbours. Positions stay in the unit square, if they started there.
+    """
+    shape = shape_of(mesh.topology)
+    moved = np.empty_like(mesh.vertices)
+    before, after, n_evaluations = refit_kernels.refit(
+        mesh.vertices,
+        shape,
+        target.pictures,
+        Settings(
+            config.first_level,
+            config.n_near,
+            config.n_far,
+            config.stiffness,
+            config.damping,
+            config.tolerance,
+            config.keep_defects,
+        ),
+        workspace(target.resolution, len(shape.loops)),
+        moved,
+    )
+    return RefitResult(mesh.with_vertices(moved), before, after, n_evaluations)
+
+
+def refit_many(
+    meshes: Iterable[PolyMesh], target: RefitTarget, config: RefitConfig = FROM_AFAR
+) -> list[RefitResult]:
+    """`refit` of many meshes on all cores; the result does not depend on how many there are."""
+    return map_threads(lambda mesh: refit(mesh, target, config), meshes)
+
+
+@lru_cache(maxsize=4096)
+def shape_of(topology: Topology) -> Shape:
+    """What the kernels need of a topology."""
+    directed = topology.boundary_half_edges
+    boundary = np.fromiter(dict.fromkeys(directed[:, 0].tolist()), np.int64)
+    unknown = np.full(topology.n_vertices, -1, np.int64)
+    unknown[boundary] = np.arange(len(boundary))
+    inner = np.flatnonzero(unknown < 0)
+    neighbours = [topology.edges[(topology.edges == v).any(axis=1)] for v in inner]
+    lists = [pairs[pairs != v] for pairs, v in zip(neighbours, inner, strict=True)]
+    return Shape(
+        boundary=boundary,
+        loops=np.ascontiguousarray(unknown[directed]),
+        edges=topology.edges,
+        corners=np.ascontiguousarray(topology.half_edges[:, 0]),
+        offsets=topology.face_offsets,
+        inner=inner,
+        neighbours=np.concatenate([*lists, np.empty(0, np.int64)]),
+        neighbour_offsets=np.cumsum([0, *map(len, lists)]),
+    )
