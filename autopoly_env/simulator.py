@@ -1,0 +1,179 @@
+"""`State` and `Simulator`: the modelling game itself, without any word of reinforcement learning.
+
+A step is S' = S . t . g (paper, section 3.4): a topological action t, then g, the translation of every vertex that a
+refit to the target finds. States are immutable values; a simulator draws no random numbers.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+import shapely
+
+from autopoly_env.actions import STOP, Action, legal_actions
+from autopoly_env.errors import ConfigError, IllegalActionError
+from autopoly_env.mesh import PolyMesh
+from autopoly_env.edits import Choice
+from autopoly_env.operators import preset
+from autopoly_env.parallel import map_threads
+from autopoly_env.placement import Disagreement, Start, leaves_outline_alone, starts
+from autopoly_env.refit import FROM_AFAR, RefitConfig, RefitTarget, refit
+from autopoly_env.score import Score, ScoreWeights, score
+from autopoly_env.silhouette import Silhouette
+
+TRANSITION_REFIT = RefitConfig(first_level=1, n_far=60)
+POLISH_RESOLUTION = 512  # of the finest refit; a score may be finer
+
+
+@dataclass(frozen=True)
+class State:
+    """A shape on the way, and how it came from the one before."""
+
+    mesh: PolyMesh
+    score: Score
+    step: int = 0
+    done: str = ""  # why it is over: "stop", "matched", "max_steps"; empty while it goes on
+    action: Action | None = None  # what made it, None for an initial state
+    choice: Choice | None = None  # what was left free by the action
+    n_refits: int = 1  # refits that the step took
+
+
+class Simulator:
+    """One target, and the rules under which meshes are built towards it.
+
+    Parameters: `silhouette`, the target; `operators`, a preset or names ("paper", "full", "edge_subdivide,..."); the
+    `resolution` R at which states are refitted and scored, in pixels; `weights` of the score; the game ends at
+    `max_steps` and where the IoU reaches `match_threshold`. Raises ConfigError for settings out of range.
+    """
+
+    def __init__(
+        self,
+        silhouette: Silhouette,
+        *,
+        operators: str = "full",
+        resolution: int = 128,
+        weights: ScoreWeights | None = None,
+        max_steps: int = 100,
+        match_threshold: float = 1.0,
+    ) -> None:
+        if not 8 <= resolution <= 1024:
+            raise ConfigError(f"resolution {resolution}: expected 8 to 1024 pixels a side")
+        if max_steps < 0:
+            raise ConfigError(f"max_steps {max_steps}: expected at least 0")
+        if not 0.0 < match_threshold <= 1.0:
+            raise ConfigError(f"match_threshold {match_threshold}: expected an IoU above 0, at most 1")
+        self.silhouette = silhouette
+        self.operators = tuple(operator.name for operator in preset(operators))
+        self.resolution = resolution
+        self.weights = weights or ScoreWeights()
+        self.max_steps = max_steps
+        self.match_threshold = match_threshold
+        self._target = silhouette.target(resolution)
+        self._refit_target = RefitTarget.of(silhouette, resolution)
+
+    def settings(self) -> dict[str, Any]:
+        """The rules as plain values, as a construction sequence keeps them."""
+        return {
+            "target": self.silhouette.name,
+            "operators": ",".join(self.operators),
+            "resolution": self.resolution,
+            "max_steps": self.max_steps,
+            "match_threshold": self.match_threshold,
+            **asdict(self.weights),
+        }
+
+    def initial(self, mesh: PolyMesh | None = None) -> State:
+        """The state before the first action: `mesh` as it is, or the better of two refitted rectangles.
+
+        The rectangles are the upright and the smallest bounding box of the target.
+        """
+        if mesh is not None:
+            return self._ended(State(mesh, self.score(mesh), n_refits=0))
+        fits = [refit(box, self._refit_target, FROM_AFAR).mesh for box in self._bounding_boxes()]
+        best = max(fits, key=lambda fit: self.score(fit).total)
+        return self._ended(State(best, self.score(best), n_refits=len(fits)))
+
+    def _bounding_boxes(self) -> Iterator[PolyMesh]:
+        rows, columns = np.nonzero(self._target.mask if self._target.mask.any() else self._target.coverage > 0.0)
+        x0, x1 = columns.min() / self.resolution, (columns.max() + 1) / self.resolution
+        y0, y1 = rows.min() / self.resolution, (rows.max() + 1) / self.resolution
+        yield PolyMesh.rectangle(x0, y0, x1, y1)
+        centres = np.column_stack((columns, rows)) + 0.5
+        around = shapely.MultiPoint(centres / self.resolution).minimum_rotated_rectangle
+        if isinstance(around, shapely.Polygon):
+            corners = np.clip(shapely.get_coordinates(around.normalize())[:4], 0.0, 1.0)
+            if not shapely.LinearRing(corners).is_ccw:
+                corners = corners[::-1]
+            yield PolyMesh.from_faces(corners, [(0, 1, 2, 3)])
+
+    def score(self, mesh: PolyMesh) -> Score:
+        """What a mesh is worth at the simulator's resolution."""
+        return score(mesh, self._target, self.weights)
+
+    def final_score(self, mesh: PolyMesh) -> Score:
+        """What a mesh is worth at the silhouette's own resolution."""
+        return score(mesh, self.silhouette.target(self.silhouette.resolution), self.weights)
+
+    def legal_actions(self, state: State) -> list[Action]:
+        """What may be done next; STOP first, and nothing once it is over."""
+        return [] if state.done else [STOP, *legal_actions(state.mesh, self.operators)]
+
+    def transition(self, state: State, action: Action) -> State:
+        """The state after one action and its refit. Raises IllegalActionError where the action is not legal."""
+        if state.done:
+            raise IllegalActionError(f"the construction has ended ({state.done}): start from an earlier state")
+        if action == STOP:
+            return replace(state, done="stop", action=STOP, choice=None, n_refits=0)
+        if action.operator not in self.operators:
+            raise IllegalActionError(f"{action.operator!r} is not one of this simulator's operators: {self.operators}")
+        begin = starts(Disagreement(state.mesh, self.silhouette), action)
+        return self._refitted(state, action, begin)
+
+    def transition_all(self, state: State, actions: Sequence[Action] | None = None) -> list[State]:
+        """`transition` of all (or the given) actions but STOP, on all cores, in their order.
+
+        Actions that turn out to have no room, such as a hole that fits nowhere, are left out.
+        """
+        if state.done:
+            return []
+        chosen = legal_actions(state.mesh, self.operators) if actions is None else actions
+        disagreement = Disagreement(state.mesh, self.silhouette)
+        jobs = _possible_starts(disagreement, [action for action in chosen if action != STOP])
+        return map_threads(lambda job: self._refitted(state, *job), jobs)
+
+    def _refitted(self, state: State, action: Action, begin: list[Start]) -> State:
+        """The best of the refits from the given starts."""
+        if leaves_outline_alone(state.mesh, action):
+            choice, mesh = begin[0]
+            n_refits = 0
+        else:
+            fits = [(choice, refit(mesh, self._refit_target, TRANSITION_REFIT)) for choice, mesh in begin]
+            choice, best = min(fits, key=lambda fit: fit[1].loss)
+            mesh, n_refits = best.mesh, len(fits)
+        after = State(mesh, self.score(mesh), state.step + 1, "", action, choice, n_refits)
+        return self._ended(after)
+
+    def _ended(self, state: State) -> State:
+        """The state with its end marked, if this is one."""
+        if state.score.iou >= self.match_threshold:
+            return replace(state, done="matched")
+        if state.step >= self.max_steps:
+            return replace(state, done="max_steps")
+        return state
+
+    def polish(self, mesh: PolyMesh) -> PolyMesh:
+        """The mesh refitted at the silhouette's own resolution (at most `POLISH_RESOLUTION`), if that scores better."""
+        size = min(self.silhouette.resolution, POLISH_RESOLUTION)
+        fitted = refit(mesh, RefitTarget.of(self.silhouette, size), RefitConfig(first_level=2)).mesh
+        return max((mesh, fitted), key=lambda candidate: self.final_score(candidate).total)
+
+
+def _possible_starts(
+    disagreement: Disagreement, actions: Sequence[Action]
+) -> Iterator[tuple[Action, list[Start]]]:
+    for action in actions:
+        try:
+            yield action, starts(disagreement, action)
+        except IllegalActionError:
+            continue
