@@ -1,0 +1,187 @@
+"""What every agent is: something that chooses actions, and something that solves a target within a budget."""
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from autopoly_env.actions import Action
+from autopoly_env.errors import ConfigError
+from autopoly_env.mesh import PolyMesh
+from autopoly_env.score import Score
+from autopoly_env.sequence import ConstructionSequence
+from autopoly_env.simulator import Simulator, State
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What an agent does next."""
+
+    action: Action
+    policy: dict[Action, float] = field(default_factory=dict)  # probability of each action considered, if known
+    value: float | None = None  # r_all that the agent expects in the end, if it has a view
+
+
+@dataclass(frozen=True)
+class Budget:
+    """How much work a solve may do; None is no limit. It is looked at between steps, so it is overrun by one at most."""
+
+    refits: int | None = None
+    seconds: float | None = None
+
+    def __post_init__(self) -> None:
+        for name, value in (("refits", self.refits), ("seconds", self.seconds)):
+            if value is not None and not value >= 0:
+                raise ConfigError(f"a budget of {value} {name}: expected at least 0")
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a solve stands, for a progress bar."""
+
+    best_total: float  # r_all of the best shape so far
+    n_steps: int
+    n_refits: int
+
+
+@dataclass(frozen=True)
+class Stats:
+    """What a solve cost."""
+
+    n_refits: int
+    seconds: float
+    stopped_by: str  # "finished", "refits", "seconds" or "interrupted"
+
+
+@dataclass(frozen=True)
+class Solution:
+    """The best shape that an agent found, and the sequence that builds it; scored at the silhouette's own resolution."""
+
+    sequence: ConstructionSequence
+    mesh: PolyMesh
+    score: Score
+    stats: Stats
+
+
+class Meter:
+    """Counts the work of one solve, reports it, and says when the budget is spent."""
+
+    def __init__(self, budget: Budget, on_progress: Callable[[Progress], None] | None = None) -> None:
+        self._budget = budget
+        self._on_progress = on_progress
+        self._began = time.perf_counter()
+        self._n_steps = 0
+        self._n_refits = 0
+        self._best_total = float("-inf")
+        self.stopped_by = "finished"
+
+    def add(self, states: Sequence[State]) -> None:
+        """Note the states that one step of work produced."""
+        best = max((state.score.total for state in states), default=float("-inf"))
+        self.count(sum(state.n_refits for state in states), best)
+
+    def count(self, n_refits: int, best_total: float) -> None:
+        """Note one step of work that took `n_refits` and whose best shape has r_all `best_total`."""
+        self._n_steps += 1
+        self._n_refits += n_refits
+        self._best_total = max(self._best_total, best_total)
+        if self._on_progress is not None:
+            self._on_progress(Progress(self._best_total, self._n_steps, self._n_refits))
+
+    def spent(self) -> bool:
+        """Whether the budget is used up."""
+        if self._budget.refits is not None and self._n_refits >= self._budget.refits:
+            self.stopped_by = "refits"
+        elif self._budget.seconds is not None and time.perf_counter() - self._began >= self._budget.seconds:
+            self.stopped_by = "seconds"
+        return self.stopped_by != "finished"
+
+    def stats(self) -> Stats:
+        """The work so far."""
+        return Stats(self._n_refits, time.perf_counter() - self._began, self.stopped_by)
+
+
+@dataclass(frozen=True)
+class Track:
+    """A state and the states that led to it."""
+
+    state: State
+    before: "Track | None" = None
+
+    def states(self) -> list[State]:
+        """From the initial state to this one."""
+        track: Track | None = self
+        states = []
+        while track is not None:
+            states.append(track.state)
+            track = track.before
+        return states[::-1]
+
+
+class Agent(ABC):
+    """Chooses actions. `solve` plays them out; an agent that does not play step by step overrides it instead."""
+
+    name = "agent"
+
+    @abstractmethod
+    def act(self, simulator: Simulator, state: State) -> Decision:
+        """Choose the next action in `state`."""
+
+    def solve(
+        self,
+        simulator: Simulator,
+        budget: Budget | None = None,
+        on_progress: Callable[[Progress], None] | None = None,
+    ) -> Solution:
+        """Build the target; return the best-scoring prefix of the states that were visited.
+
+        Stops at the budget, too. KeyboardInterrupt (Ctrl-C) ends the search and returns the best so far, with
+        `stats.stopped_by` "interrupted".
+        """
+        meter = Meter(budget or Budget(), on_progress)
+        track = Track(simulator.initial())
+        meter.add([track.state])
+        try:
+            track = self._search(simulator, track, meter)
+        except _Interrupted as interruption:
+            track = interruption.best
+            meter.stopped_by = "interrupted"
+        return finish(simulator, track.states(), meter)
+
+    def _search(self, simulator: Simulator, track: Track, meter: Meter) -> Track:
+        """Play from `track` on; return the track with the best state."""
+        best = track
+        try:
+            while not track.state.done and not meter.spent():
+                state = simulator.transition(track.state, self.act(simulator, track.state).action)
+                meter.add([state])
+                track = Track(state, track)
+                if state.score.total > best.state.score.total:
+                    best = track
+        except KeyboardInterrupt:
+            raise _Interrupted(best) from None
+        return best
+
+
+class _Interrupted(Exception):
+    """Ctrl-C, with the best that was found until then."""
+
+    def __init__(self, best: Track) -> None:
+        super().__init__("interrupted")
+        self.best = best
+
+
+def finish(simulator: Simulator, states: Sequence[State], meter: Meter) -> Solution:
+    """The solution whose construction is `states`: the last mesh polished, all scores at the silhouette's resolution."""
+    meshes = [state.mesh for state in states]
+    meshes[-1] = simulator.polish(meshes[-1])
+    scores = [simulator.final_score(mesh) for mesh in meshes]
+    last = max(range(len(scores)), key=lambda k: (scores[k].total, -k))
+    settings = {**simulator.settings(), "scored_at": simulator.silhouette.resolution}
+    transitions = [
+        (state.action, state.choice, mesh, score.as_dict())
+        for state, mesh, score in zip(states[1 : last + 1], meshes[1:], scores[1:], strict=False)
+        if state.action is not None
+    ]
+    sequence = ConstructionSequence.record(settings, meshes[0], scores[0].as_dict(), transitions)
+    return Solution(sequence, meshes[last], scores[last], meter.stats())

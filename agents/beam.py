@@ -1,0 +1,66 @@
+"""`greedy` and `beam`: keep the w best shapes, try everything on each, go on for a while where nothing improves."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from agents.base import Agent, Decision, Meter, Track, _Interrupted
+from autopoly_env.actions import STOP
+from autopoly_env.errors import ConfigError
+from autopoly_env.mesh import canonical_hash
+from autopoly_env.simulator import Simulator, State
+
+
+@dataclass(frozen=True)
+class BeamConfig:
+    """How `beam` searches; `greedy` is a beam of width 1."""
+
+    width: int = 8
+    patience: int = 3  # steps in a row that may fail to improve the best score
+    merge_grid: float = 1 / 128  # shapes that agree to this length (unit square) count as one
+
+    def __post_init__(self) -> None:
+        if self.width < 1 or self.patience < 1 or not self.merge_grid > 0.0:
+            raise ConfigError(f"{self}: expected a width and a patience of at least 1 and a positive merge_grid")
+
+
+class BeamAgent(Agent):
+    """Beam search over whole transitions: every legal action of every kept shape, refitted and scored."""
+
+    name = "beam"
+
+    def __init__(self, config: BeamConfig) -> None:
+        self._config = config
+
+    def act(self, simulator: Simulator, state: State) -> Decision:
+        """The best child by score; STOP where no child is better."""
+        children = simulator.transition_all(state)
+        best = max(children, key=lambda child: child.score.total, default=None)
+        if best is None or best.action is None or best.score.total <= state.score.total:
+            return Decision(STOP, value=state.score.total)
+        return Decision(best.action, value=best.score.total)
+
+    def _search(self, simulator: Simulator, track: Track, meter: Meter) -> Track:
+        best, kept, failures = track, [track], 0
+        try:
+            while kept and failures < self._config.patience and not meter.spent():
+                tracks = []
+                for parent in kept:
+                    children = simulator.transition_all(parent.state)
+                    meter.add(children)
+                    tracks += [Track(child, parent) for child in children]
+                kept = self._select(tracks)
+                failures += 1
+                if kept and kept[0].state.score.total > best.state.score.total:
+                    best, failures = kept[0], 0
+        except KeyboardInterrupt:
+            raise _Interrupted(best) from None
+        return best
+
+    def _select(self, tracks: Iterable[Track]) -> list[Track]:
+        """The `width` best of them, best first, no shape twice."""
+        chosen: dict[str, Track] = {}
+        for track in sorted(tracks, key=lambda track: -track.state.score.total):
+            chosen.setdefault(canonical_hash(track.state.mesh, self._config.merge_grid), track)
+            if len(chosen) == self._config.width:
+                break
+        return list(chosen.values())

@@ -1,0 +1,39 @@
+"""`random`: uniform over the legal actions; the floor under every comparison."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from agents.base import Agent, Decision
+from autopoly_env.actions import Action
+from autopoly_env.simulator import Simulator, State
+
+
+@dataclass(frozen=True)
+class RandomConfig:
+    """How `random` plays."""
+
+    seed: int = 0
+    n_steps: int = 20  # after which it stops
+
+
+class RandomAgent(Agent):
+    """Draws an operator, then one of its legal elements, so that operators with many elements are not favoured."""
+
+    name = "random"
+
+    def __init__(self, config: RandomConfig) -> None:
+        self._config = config
+        self._rng = np.random.default_rng(config.seed)
+
+    def act(self, simulator: Simulator, state: State) -> Decision:
+        stop, *legal = simulator.legal_actions(state)
+        if not legal or state.step >= self._config.n_steps:
+            return Decision(stop)
+        by_operator: dict[str, list[Action]] = {}
+        for action in legal:
+            by_operator.setdefault(action.operator, []).append(action)
+        chosen = by_operator[sorted(by_operator)[self._rng.integers(len(by_operator))]]
+        share = 1.0 / len(by_operator)
+        policy = {a: share / len(group) for group in by_operator.values() for a in group}
+        return Decision(chosen[self._rng.integers(len(chosen))], policy)

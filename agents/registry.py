@@ -1,0 +1,46 @@
+"""Agents by name: `make_agent("beam", width=4)`."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from agents.base import Agent
+from agents.beam import BeamAgent, BeamConfig
+from agents.climb import ClimbAgent, ClimbConfig
+from agents.random_agent import RandomAgent, RandomConfig
+from agents.trace.agent import TraceAgent, TraceConfig
+from autopoly_env.errors import ConfigError
+
+
+class _Greedy(BeamAgent):
+    name = "greedy"
+
+
+AGENTS: dict[str, tuple[Callable[[Any], Agent], Any]] = {
+    "random": (RandomAgent, RandomConfig()),
+    "greedy": (_Greedy, BeamConfig(width=1)),
+    "beam": (BeamAgent, BeamConfig()),
+    "trace": (TraceAgent, TraceConfig()),
+    "climb": (ClimbAgent, ClimbConfig()),
+}
+
+
+def make_agent(name: str, **options: Any) -> Agent:
+    """The agent of that name with these options of its config class. Raises ConfigError for an unknown one."""
+    if name not in AGENTS:
+        raise ConfigError(f"agent {name!r} is unknown; give one of {', '.join(AGENTS)}")
+    make, default = AGENTS[name]
+    unknown = sorted(set(options) - set(default.__dataclass_fields__))
+    if unknown:
+        known = ", ".join(default.__dataclass_fields__)
+        raise ConfigError(f"agent {name!r} has no option {unknown[0]!r}; its options are {known}")
+    values = {field: getattr(replace(default), field) for field in default.__dataclass_fields__} | options
+    try:
+        config = TypeAdapter(type(default)).validate_python(values)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        raise ConfigError(f"agent {name!r}, option {where}: {first['msg']}, got {first['input']!r}") from None
+    return make(config)

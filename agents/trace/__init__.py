@@ -1,0 +1,1 @@
+"""`trace`: contours, simplified optimally, refitted, and told as a construction sequence."""

@@ -1,0 +1,51 @@
+"""Closed contours of a silhouette: outer rings and holes, in the unit square."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from skimage.measure import find_contours
+
+from autopoly_env.arrays import FloatArray
+from autopoly_env.silhouette import Silhouette
+
+TRACE_RESOLUTION = 256  # contours are followed at the silhouette's own resolution, at most this
+
+
+@dataclass(frozen=True)
+class Ring:
+    """A closed polygon. Outer rings have positive shoelace area, holes negative (y down)."""
+
+    points: FloatArray  # (n, 2) unit square, the first not repeated
+    parent: int  # for a hole the index of the outer ring around it, for an outer ring -1
+
+    @property
+    def is_hole(self) -> bool:
+        return self.parent >= 0
+
+
+def signed_area(points: FloatArray) -> float:
+    """Shoelace area of a closed polygon (n, 2), positive as faces are wound."""
+    x, y = points.T
+    return float(0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1)))
+
+
+def trace_rings(silhouette: Silhouette) -> list[Ring]:
+    """All contours at half coverage: outer rings first, the largest first, then the holes."""
+    size = min(silhouette.resolution, TRACE_RESOLUTION)
+    padded = np.pad(silhouette.target(size).coverage, 1)
+    loops = [(line[:-1, ::-1] - 0.5) / size for line in find_contours(padded, 0.5)]
+    loops = [loop for loop in loops if len(loop) >= 3 and abs(signed_area(loop)) > 0.0]
+    if not loops:
+        return []
+    largest = max(loops, key=lambda loop: abs(signed_area(loop)))
+    outward = 1.0 if signed_area(largest) > 0.0 else -1.0  # the largest contour is an outer one
+    oriented = [loop if outward > 0.0 else loop[::-1] for loop in loops]
+    outer = sorted((loop for loop in oriented if signed_area(loop) > 0.0), key=signed_area, reverse=True)
+    polygons = [shapely.Polygon(loop) for loop in outer]
+    rings = [Ring(loop, -1) for loop in outer]
+    for hole in sorted((loop for loop in oriented if signed_area(loop) < 0.0), key=signed_area):
+        inside = [k for k, polygon in enumerate(polygons) if shapely.contains_xy(polygon, *hole[0])]
+        if inside:
+            rings.append(Ring(hole, max(inside)))  # the smallest one around it
+    return rings
