@@ -27,7 +27,7 @@ AGENTS: dict[str, tuple[Callable[[Any], Agent], Any]] = {
 }
 
 
-def make_agent(name: str, **options: Any) -> Agent:
+def make_agent(name: str, /, **options: Any) -> Agent:
     """The agent of that name with these options of its config class. Raises ConfigError for an unknown one."""
     if name not in AGENTS:
         raise ConfigError(f"agent {name!r} is unknown; give one of {', '.join(AGENTS)}")

@@ -96,7 +96,8 @@ def _draw_cells(
         frame = viewer.draw_mesh(mesh, silhouette, size=size, highlight=new, caption=caption)
         cells.append(Image.fromarray(frame))
     best = len(sequence.best_prefix().steps)
-    _mark(cells[-1], size, "last", viewer.SOFT_INK)
+    if best < len(cells) - 1:
+        _mark(cells[-1], size, "last", viewer.SOFT_INK)
     _mark(cells[best], size, "best", ACCENT)
     return cells
 

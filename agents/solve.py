@@ -1,0 +1,144 @@
+"""The command `python -m agents.solve`: from silhouette images to meshes, construction sequences and pictures."""
+
+import errno
+import io
+import json
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from autopoly_env.errors import AutoPolyError, ConfigError
+
+DEFAULT_AGENT = "trace"
+USAGE_ERROR, FAILURE = 2, 1
+
+HELP = """Build a polygon mesh of every silhouette and tell how, action by action.
+
+\b
+Examples:
+  python -m agents.solve examples
+  python -m agents.solve chair.png mug.png --agent greedy --operators paper
+  python -m agents.solve chair.png --agent beam --option width=4 --refits 5000
+  python -m agents.solve 'shapes/**/*.png' --json --quiet > scores.jsonl
+
+\b
+For every image, OUT/<name of the file without its ending>/ gets
+  sequence.json  the actions, to be replayed    mesh.obj  the mesh, y up
+  steps.png      every step over the target     mesh.svg  the mesh, to edit
+and OUT/overview.png shows all meshes, if there are several images.
+
+\b
+Printed are the scores, at each image's own resolution, and the picture to open:
+  r_all = w_sm r_sm - w_sc r_sc - w_si r_si
+  r_sm: IoU, 0 to 1      r_sc: V + E + F      r_si: self-intersections
+
+Ctrl-C writes the best mesh so far of the image in work and stops; a second one aborts at once.
+Exit codes: 0 all is well, 1 something failed, 2 wrong usage, 130 Ctrl-C.
+"""
+
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode="rich")
+
+
+@app.command(help=HELP, context_settings={"help_option_names": ["-h", "--help"]})
+def solve(
+    images: Annotated[
+        list[str], typer.Argument(metavar="IMAGE", help="Files, folders or patterns; ** crosses folders.")
+    ],
+    agent: Annotated[str, typer.Option(help="Who builds: trace, climb, beam, greedy or random.")] = DEFAULT_AGENT,
+    operators: Annotated[str, typer.Option(help="paper, full, or operators, separated by commas.")] = "full",
+    w_sm: Annotated[float, typer.Option(help="Weight of the IoU.")] = 100.0,
+    w_sc: Annotated[float, typer.Option(help="Weight of the complexity V + E + F.")] = 0.3,
+    w_si: Annotated[float, typer.Option(help="Weight of the self-intersections.")] = 5.0,
+    resolution: Annotated[int, typer.Option(help="Pixels a side at which the agent works.")] = 128,
+    max_steps: Annotated[int, typer.Option(help="Steps after which a construction ends.")] = 100,
+    seconds: Annotated[
+        float | None,
+        typer.Option(help="Time for an image; results then depend on the machine.", show_default="none"),
+    ] = None,
+    refits: Annotated[int | None, typer.Option(help="Limit of refits an image.", show_default="none")] = None,
+    seed: Annotated[int, typer.Option(help="Of the agents that draw random numbers.")] = 0,
+    option: Annotated[
+        list[str] | None, typer.Option(metavar="KEY=VALUE", help="An option of the agent; may be repeated.")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out"),
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print a JSON record a line as each image is done, no table.")
+    ] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar, no notes.")] = False,
+) -> int:
+    """Check everything that can be checked before the work, then do it; return the exit code."""
+    from agents.base import Budget
+    from agents.solve_files import claim_folder
+    from agents.solve_report import Report
+    from agents.solve_run import Settings, name_jobs, solve_all
+    from autopoly_env.score import ScoreWeights
+
+    weights = ScoreWeights(w_sm, w_sc, w_si)
+    budget = Budget(refits, seconds)
+    settings = Settings(agent, _parse_options(option or []), seed, operators, resolution, max_steps, weights, budget)
+    settings.check()
+    found, problems = _find(images)
+    jobs = name_jobs(found, out)
+    claim_folder(out)
+    with Report(len(jobs) + len(problems), as_json=as_json, quiet=quiet) as report:
+        for image, problem in problems:
+            report.failed(image, problem)
+        return solve_all(jobs, settings, out, report)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command; whatever is wrong is told in one line on stderr. Returns the exit code."""
+    try:
+        return app(arguments, prog_name="python -m agents.solve", standalone_mode=False) or 0
+    except ConfigError as error:
+        return _complain(str(error), USAGE_ERROR)
+    except AutoPolyError as error:
+        return _complain(str(error), FAILURE)
+    except OSError as error:
+        if error.errno == errno.EPIPE:
+            raise
+        sys.stdout = io.StringIO()  # so that leaving does not fail on it again
+        return _complain(f"cannot print the results ({error.strerror}); give them another place to go", FAILURE)
+    except Exception as error:
+        if not hasattr(error, "format_message"):  # which typer's own usage errors have
+            raise
+        return _complain(f"{error.format_message()} (see --help)", USAGE_ERROR)
+
+
+def _complain(message: str, exit_code: int) -> int:
+    print("error:", " ".join(message.split()), file=sys.stderr)
+    return exit_code
+
+
+def _parse_options(given: list[str]) -> dict[str, Any]:
+    """`key=value` pairs; a value is read as JSON where it is that, else it is text."""
+    options = {}
+    for pair in given:
+        key, equals, value = pair.partition("=")
+        if not (key and equals):
+            raise ConfigError(f"--option {pair}: expected key=value, such as width=4")
+        try:
+            options[key] = json.loads(value)
+        except ValueError:
+            options[key] = value
+    return options
+
+
+def _find(given: list[str]) -> tuple[list[Path], list[tuple[str, str]]]:
+    """The images, each once, and (what was given, what is wrong with it) where there are none."""
+    from autopoly_env.silhouette import find_images
+
+    found: dict[Path, None] = {}
+    problems = []
+    for path in given:
+        try:
+            found.update(dict.fromkeys(find_images([path])))
+        except AutoPolyError as error:
+            problems.append((path, str(error)))
+    return list(found), problems
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,100 @@
+"""What `agents.solve` writes: a folder of results for every image, and an overview of all of them."""
+
+import math
+import os
+import shutil
+import tempfile
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from agents.base import Solution
+from autopoly_env import viewer
+from autopoly_env.arrays import ByteArray
+from autopoly_env.errors import OutputError
+from autopoly_env.export import contact_sheet, save_png, to_obj, to_svg
+from autopoly_env.silhouette import Silhouette
+
+RESULTS = ("sequence.json", "mesh.obj", "mesh.svg", "steps.png")
+OVERVIEW = "overview.png"
+PAGE_SIZE = 3850  # pixels that an overview may have each way
+CELL_SIZE = 256  # pixels of a mesh in it, if that fits
+
+
+@dataclass(frozen=True)
+class Result:
+    """A solved image."""
+
+    image: Path
+    name: str
+    solution: Solution
+    notes: tuple[str, ...]
+    files: dict[str, Path]  # by their names, as in RESULTS
+
+
+def claim_folder(folder: Path) -> None:
+    """Make the folder for the results, and see that it can be written. Raises OutputError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError as error:
+        reason = error.strerror or error
+        raise OutputError(f"cannot write to the folder {folder} ({reason}); give another one with --out") from None
+
+
+def write_results(
+    folder: Path, solution: Solution, silhouette: Silhouette, shielded: Callable[[], AbstractContextManager[None]]
+) -> dict[str, Path]:
+    """Write all files of an image or none: they are completed beside the folder, and moved there in one go.
+
+    The moves happen within `shielded()`. Raises OutputError if that does not work.
+    """
+    try:
+        staging = Path(tempfile.mkdtemp(prefix=".solve-", suffix=".tmp", dir=folder.parent))
+        try:
+            solution.sequence.save(staging / "sequence.json")
+            (staging / "mesh.obj").write_text(to_obj(solution.mesh), encoding="utf-8")
+            (staging / "mesh.svg").write_text(to_svg(solution.mesh, target=silhouette), encoding="utf-8")
+            save_png(contact_sheet(solution.sequence, silhouette), staging / "steps.png")
+            with shielded():
+                folder.mkdir(exist_ok=True)
+                for name in RESULTS:
+                    os.replace(staging / name, folder / name)
+        finally:
+            shutil.rmtree(staging, ignore_errors=True)
+    except OSError as error:
+        raise OutputError(f"cannot write the results to {folder} ({error.strerror or error}); make room") from None
+    return {name: folder / name for name in RESULTS}
+
+
+class Overview:
+    """All meshes over their targets on one page, in the order in which they were added."""
+
+    def __init__(self, n_images: int) -> None:
+        self._n_columns = max(1, math.ceil((1.25 * n_images) ** 0.5))
+        self._size = max(viewer.MIN_SIZE, min(CELL_SIZE, PAGE_SIZE // self._n_columns))
+        self._cells: list[ByteArray] = []
+
+    def __len__(self) -> int:
+        return len(self._cells)
+
+    def add(self, result: Result, silhouette: Silhouette) -> None:
+        """Draw a mesh, its name and its r_all beneath."""
+        solution = result.solution
+        caption = f"{result.name}\nr_all {solution.score.total:.2f}"
+        self._cells.append(viewer.draw_mesh(solution.mesh, silhouette, size=self._size, caption=caption))
+
+    def page(self) -> Image.Image:
+        """The page, at least one mesh on it."""
+        height, width, _ = self._cells[0].shape
+        n_columns = min(self._n_columns, len(self._cells))
+        n_rows = math.ceil(len(self._cells) / n_columns)
+        page = np.full((n_rows * height, n_columns * width, 3), viewer.PAPER, np.uint8)
+        for i, cell in enumerate(self._cells):
+            row, column = divmod(i, n_columns)
+            page[row * height : (row + 1) * height, column * width : (column + 1) * width] = cell
+        return Image.fromarray(page)

@@ -1,0 +1,179 @@
+"""What `agents.solve` prints: a progress bar and errors on stderr, a table or JSON records on stdout."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from rich import box
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+from rich.text import Text
+
+from agents import base
+from agents.solve_files import Result
+
+COLUMNS = ("r_sm", "r_sc", "r_si", "r_all", "actions", "refits", "seconds")
+FORMATS = (".4f", ".0f", ".0f", ".2f", ".0f", ".0f", ".2f")
+MEAN_FORMATS = (".4f", ".1f", ".1f", ".2f", ".1f", ".1f", ".2f")
+WARNING = "warning:"
+MOST_NOTES = 8  # lines of notes below a table
+MOST_NAMES = 4  # names of images in such a line
+PLAIN_WIDTH = 120  # of a table that goes to a file
+
+
+class Report:
+    """Tells the user how it goes with `n_tasks` images; as a context it shows the progress bar where it can be seen."""
+
+    def __init__(self, n_tasks: int, *, as_json: bool = False, quiet: bool = False) -> None:
+        self.n_failed = 0
+        self._as_json, self._quiet = as_json, quiet
+        self._rows: dict[str, tuple[float, ...]] = {}
+        self._notes: dict[str, list[str]] = {}  # the names of the images that have a note
+        self._warnings: list[str] = []
+        self._picture: Path | None = None
+        self._messages = Console(stderr=True)
+        self._output = Console()
+        if not self._output.is_terminal:
+            self._output.width = PLAIN_WIDTH
+        is_seen = self._messages.is_terminal and not quiet and not (as_json and self._output.is_terminal)
+        self._bar = Progress(
+            SpinnerColumn(),
+            MofNCompleteColumn(),
+            BarColumn(bar_width=24),
+            TimeElapsedColumn(),
+            TextColumn("{task.description}", markup=False),
+            console=self._messages,
+            disable=not is_seen,
+            redirect_stdout=False,
+            transient=True,
+        )
+        self._task = self._bar.add_task("", total=n_tasks)
+        self._name = ""
+
+    def __enter__(self) -> "Report":
+        self._bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.stop()
+
+    def begin(self, name: str) -> None:
+        """An image is begun."""
+        self._name = name
+        self._bar.update(self._task, description=name)
+
+    def progress(self, progress: base.Progress) -> None:
+        """An agent has come this far with it."""
+        text = f"{self._name}  r_all {progress.best_total:.2f}, {progress.n_refits} refits"
+        self._bar.update(self._task, description=text)
+
+    def solved(self, result: Result) -> None:
+        """An image is solved and its results are written."""
+        self._bar.advance(self._task)
+        self._picture = result.files["steps.png"]
+        if self._as_json:
+            _print_record(record_of(result))
+        self._rows[result.name] = _numbers_of(result)
+        for note in result.notes:
+            if note.startswith(WARNING):
+                self._warnings.append(f"{WARNING} {result.image}: {note.removeprefix(WARNING).strip()}")
+            else:
+                self._notes.setdefault(note, []).append(result.name)
+
+    def failed(self, what: str, problem: str) -> None:
+        """Something, most often an image, has failed."""
+        self.n_failed += 1
+        problem = " ".join(problem.split())
+        self._bar.advance(self._task)
+        if self._as_json:
+            _print_record({"image": what, "error": problem})
+        self.say(f"error: {problem}" if what in problem else f"error: {what}: {problem}")
+
+    def say(self, text: str) -> None:
+        """A line on stderr, above the progress bar."""
+        _print_line(self._messages, text)
+
+    def finish(self, overview: Path | None) -> None:
+        """The work is done: show the table and what else there is to know, last the picture to open."""
+        self._bar.stop()
+        if not self._rows:
+            return
+        lines = list(self._warnings)
+        if not (self._quiet or self._as_json):
+            lines += _note_lines(self._notes, len(self._rows))
+        if not (self._quiet and self._as_json):
+            lines.append(f"Open {overview or self._picture}")
+        if not self._as_json:
+            self._output.print(_table(self._rows))
+        for line in lines:
+            _print_line(self._messages if self._as_json else self._output, line)
+
+
+def _print_line(console: Console, text: str) -> None:
+    console.print(text, markup=False, highlight=False, emoji=False, soft_wrap=True)
+
+
+def _print_record(record: dict[str, Any]) -> None:
+    print(json.dumps(record, allow_nan=False), flush=True)
+
+
+def _numbers_of(result: Result) -> tuple[float, ...]:
+    """A row of the table, in the order of COLUMNS."""
+    score, stats = result.solution.score, result.solution.stats
+    n_actions = len(result.solution.sequence.steps)
+    parts = (score.iou, score.complexity, score.self_intersections, score.total)
+    return (*parts, n_actions, stats.n_refits, stats.seconds)
+
+
+def _table(rows: dict[str, tuple[float, ...]]) -> Table:
+    """A row for every image, and their mean if there are several."""
+    table = Table(box=box.SIMPLE_HEAD, show_footer=len(rows) > 1)
+    means = [sum(column) / len(rows) for column in zip(*rows.values(), strict=True)]
+    table.add_column("name", footer=f"mean of {len(rows)}", overflow="fold")
+    for name, mean, style in zip(COLUMNS, means, MEAN_FORMATS, strict=True):
+        table.add_column(name, footer=format(mean, style), justify="right", no_wrap=True)
+    for name, row in rows.items():
+        table.add_row(Text(name), *(format(value, style) for value, style in zip(row, FORMATS, strict=True)))
+    return table
+
+
+def _note_lines(notes: dict[str, list[str]], n_images: int) -> list[str]:
+    """A line for every note that images share, those of most images first."""
+    if n_images == 1:
+        return [f"notes: {'; '.join(notes)}"] if notes else []
+    lines = []
+    for note, names in sorted(notes.items(), key=lambda item: -len(item[1])):
+        first, n_more = ", ".join(names[:MOST_NAMES]), len(names) - MOST_NAMES
+        whose = f"all {n_images} images" if len(names) == n_images else first
+        lines.append(f"note: {note}: {whose}" + (f" and {n_more} more" if whose == first and n_more > 0 else ""))
+    if len(lines) <= MOST_NOTES + 1:
+        return lines
+    return [*lines[:MOST_NOTES], f"note: {len(lines) - MOST_NOTES} more notes; --json shows them"]
+
+
+def record_of(result: Result) -> dict[str, Any]:
+    """A result as plain values, for JSON."""
+    solution = result.solution
+    n_vertices, n_edges, n_faces = solution.mesh.counts
+    settings = solution.sequence.settings
+    return {
+        "image": str(result.image),
+        "name": result.name,
+        "agent": settings["agent"],
+        "settings": settings,
+        "seed": settings["seed"],
+        "r_sm": solution.score.iou,
+        "r_sc": solution.score.complexity,
+        "r_si": solution.score.self_intersections,
+        "r_all": solution.score.total,
+        "V": n_vertices,
+        "E": n_edges,
+        "F": n_faces,
+        "actions": len(solution.sequence.steps),
+        "refits": solution.stats.n_refits,
+        "seconds": solution.stats.seconds,
+        "stopped_by": solution.stats.stopped_by,
+        "notes": list(result.notes),
+        "files": {name: str(path) for name, path in result.files.items()},
+    }

@@ -1,0 +1,208 @@
+"""The work behind `agents.solve`: one image after the other, each whole or not at all, until done or Ctrl-C."""
+
+import signal
+import traceback
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from agents.base import Agent, Budget
+from agents.registry import AGENTS, make_agent
+from agents.solve_files import OVERVIEW, RESULTS, Overview, Result, write_results
+from agents.solve_report import Report
+from autopoly_env.errors import AutoPolyError, ConfigError
+from autopoly_env.export import save_png
+from autopoly_env.parallel import n_threads
+from autopoly_env.score import ScoreWeights
+from autopoly_env.silhouette import Silhouette, load_silhouette
+from autopoly_env.simulator import Simulator
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is the same for all images."""
+
+    agent: str
+    options: dict[str, Any]
+    seed: int  # for agents that have such an option, unless `options` has it
+    operators: str
+    resolution: int
+    max_steps: int
+    weights: ScoreWeights
+    budget: Budget
+
+    def check(self) -> None:
+        """Raise ConfigError for whatever is wrong, before any image is read."""
+        self.new_agent()
+        self.simulator(Silhouette(np.ones((1, 1), np.bool_)))
+        n_threads()
+
+    def new_agent(self) -> Agent:
+        """A fresh one for every image, so that no result depends on the images before it."""
+        takes_seed = self.agent in AGENTS and "seed" in AGENTS[self.agent][1].__dataclass_fields__
+        options = {"seed": self.seed, **self.options} if takes_seed else self.options
+        return make_agent(self.agent, **options)
+
+    def simulator(self, silhouette: Silhouette) -> Simulator:
+        """The rules, for one target."""
+        return Simulator(
+            silhouette,
+            operators=self.operators,
+            resolution=self.resolution,
+            weights=self.weights,
+            max_steps=self.max_steps,
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """What a construction sequence keeps beside the simulator's settings."""
+        seed = self.options.get("seed", self.seed)
+        return {"agent": self.agent, "options": self.options, "seed": seed, "budget": asdict(self.budget)}
+
+
+@dataclass(frozen=True)
+class Job:
+    """An image, and the name under which its results go."""
+
+    image: Path
+    name: str
+    notes: tuple[str, ...] = ()  # why it is not the name of the image, if it is not
+
+
+class CtrlC:
+    """The first Ctrl-C ends a search (KeyboardInterrupt in it) and then the run, the second ends everything at once."""
+
+    def __init__(self) -> None:
+        self.n_pressed = 0
+        self._searching = self._shielded = False
+
+    def __enter__(self) -> "CtrlC":
+        self._before = signal.signal(signal.SIGINT, self._on_signal)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        signal.signal(signal.SIGINT, self._before)
+
+    def _on_signal(self, *_: object) -> None:
+        self.n_pressed += 1
+        if not self._shielded and (self._searching or self.n_pressed > 1):
+            raise KeyboardInterrupt
+
+    @contextmanager
+    def searching(self) -> Iterator[None]:
+        """Where the first Ctrl-C is for the agent, which returns its best so far."""
+        self._searching = True
+        try:
+            if self.n_pressed:
+                raise KeyboardInterrupt
+            yield
+        finally:
+            self._searching = False
+
+    @contextmanager
+    def shielded(self) -> Iterator[None]:
+        """Where even a second Ctrl-C has to wait, for the blink of an eye."""
+        self._shielded = True
+        try:
+            yield
+        finally:
+            self._shielded = False
+        if self.n_pressed > 1:
+            raise KeyboardInterrupt
+
+
+def name_jobs(images: Sequence[Path], out: Path) -> list[Job]:
+    """A name of its own for every image: its stem, with a number where another image has that name already.
+
+    Raises ConfigError if a result would overwrite one of the images.
+    """
+    taken = {OVERVIEW: OVERVIEW}
+    jobs = []
+    for image in images:
+        stem = image.stem.encode("utf-8", "replace").decode().lstrip(".") or "image"
+        name, count = stem, 1
+        while name.casefold() in taken:
+            count += 1
+            name = f"{stem}-{count}"
+        notes = () if count == 1 else (f"warning: called {name} here, for {taken[stem.casefold()]} has its name, too",)
+        taken[name.casefold()] = str(image)
+        jobs.append(Job(image, name, notes))
+    results = {(out / path).resolve() for job in jobs for path in (*(f"{job.name}/{f}" for f in RESULTS), OVERVIEW)}
+    for image in images:
+        if image.resolve() in results:
+            raise ConfigError(f"the results would overwrite the image {image}; give another folder with --out")
+    return jobs
+
+
+def solve_all(jobs: Sequence[Job], settings: Settings, out: Path, report: Report) -> int:
+    """Solve every image, write and report each; return the exit code."""
+    overview = Overview(len(jobs))
+    with CtrlC() as ctrl_c:
+        try:
+            n_left = _solve_each(jobs, settings, out, report, overview, ctrl_c)
+            report.finish(_write_overview(overview, out, report))
+        except KeyboardInterrupt:
+            report.say("aborted by Ctrl-C; the files that were written are whole")
+            return 130
+    if ctrl_c.n_pressed:
+        report.say(f"stopped by Ctrl-C: {n_left} of {len(jobs)} images left")
+        return 130
+    return 1 if report.n_failed else 0
+
+
+def _solve_each(
+    jobs: Sequence[Job], settings: Settings, out: Path, report: Report, overview: Overview, ctrl_c: CtrlC
+) -> int:
+    """Solve one image after the other until Ctrl-C; return how many are left then."""
+    n_left = len(jobs)
+    for job in jobs:
+        if ctrl_c.n_pressed:
+            break
+        report.begin(job.name)
+        try:
+            result, silhouette = _solve(job, settings, out, report, ctrl_c)
+        except KeyboardInterrupt:
+            if ctrl_c.n_pressed > 1:
+                raise
+            break
+        except AutoPolyError as error:
+            report.failed(str(job.image), str(error))
+        except Exception as error:  # whatever it is, the other images can be solved
+            report.failed(str(job.image), _unexpected(error))
+        else:
+            overview.add(result, silhouette)
+            report.solved(result)
+        n_left -= 1
+    return n_left
+
+
+def _solve(job: Job, settings: Settings, out: Path, report: Report, ctrl_c: CtrlC) -> tuple[Result, Silhouette]:
+    """Solve an image and write its results."""
+    silhouette = load_silhouette(job.image, name=job.name)
+    simulator, agent = settings.simulator(silhouette), settings.new_agent()
+    with ctrl_c.searching():
+        solution = agent.solve(simulator, settings.budget, report.progress)
+    sequence = solution.sequence
+    sequence = replace(sequence, settings={**sequence.settings, **settings.as_dict()})
+    solution = replace(solution, sequence=sequence)
+    files = write_results(out / job.name, solution, silhouette, ctrl_c.shielded)
+    return Result(job.image, job.name, solution, (*job.notes, *silhouette.notes), files), silhouette
+
+
+def _write_overview(overview: Overview, out: Path, report: Report) -> Path | None:
+    """Draw all meshes on one page, if there are several; return its path."""
+    if len(overview) < 2:
+        return None
+    try:
+        return save_png(overview.page(), out / OVERVIEW)
+    except AutoPolyError as error:
+        report.failed(str(out / OVERVIEW), str(error))
+        return None
+
+
+def _unexpected(error: Exception) -> str:
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{type(error).__name__}: {error} (unexpected, in {Path(place.filename).name} line {place.lineno})"

@@ -1,0 +1,44 @@
+"""Animated GIFs, with Pillow alone."""
+
+import io
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from autopoly_env.arrays import ByteArray
+from autopoly_env.errors import ConfigError
+from autopoly_env.files import write_atomically
+
+N_COLOURS = 64  # the viewer's few colours and the shades between them at the edges
+LAST_FRAME_SECONDS = 2.0
+
+
+def save_gif(frames: Sequence[ByteArray], path: str | os.PathLike[str], *, fps: float = 2.0) -> Path:
+    """Write RGB frames (H, W, 3) uint8, all of one size, as a GIF that loops; the last frame stays a little longer.
+
+    Raises ConfigError for no frames, frames of several sizes or types, or `fps` out of 0.1 to 50; OutputError if the
+    file cannot be written.
+    """
+    shapes = {np.shape(frame) for frame in frames}
+    if len(shapes) != 1 or len(next(iter(shapes))) != 3 or next(iter(shapes))[2] != 3:
+        raise ConfigError(f"frames of the shapes {sorted(shapes)}: expected one or more of one shape (H, W, 3)")
+    if any(frame.dtype != np.uint8 for frame in frames):
+        raise ConfigError(f"frames of dtype {frames[0].dtype}: expected uint8, 0 to 255")
+    if not 0.1 <= fps <= 50.0:
+        raise ConfigError(f"{fps} frames a second: expected 0.1 to 50, which GIF can time")
+    palette = _palette(frames)
+    pictures = [Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
+    each = round(1000.0 / fps)
+    durations = [each] * (len(pictures) - 1) + [max(each, round(1000.0 * LAST_FRAME_SECONDS))]
+    stream = io.BytesIO()
+    pictures[0].save(stream, "GIF", save_all=True, append_images=pictures[1:], duration=durations, loop=0)
+    return write_atomically(path, stream.getvalue())
+
+
+def _palette(frames: Sequence[ByteArray]) -> Image.Image:
+    """One palette for all frames, so that what stays does not flicker."""
+    sample = [frames[k] for k in sorted({0, len(frames) // 2, len(frames) - 1})]
+    return Image.fromarray(np.concatenate(sample)).quantize(N_COLOURS, dither=Image.Dither.NONE)
