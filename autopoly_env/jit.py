@@ -1,7 +1,8 @@
 """`kernel`: compile a numeric function with Numba once per machine, and say so the one time that it takes a while.
 
 Numba's own on-disk cache is stamped with one source file, so a kernel that inlines a kernel of another file goes
-stale when that other file changes. Here every kernel is stamped with all ``*_kernels.py`` files of this package and of its own folder.
+stale when that other file changes. Here every kernel is stamped with all ``*_kernels.py`` files of this package and
+of its own folder.
 """
 
 import contextlib
@@ -21,8 +22,8 @@ _announced = False
 
 @functools.cache
 def _kernel_sources_stamp(folder: Path) -> bytes:
-    """Hash of every kernel file of this package and of `folder`."""
-    digest = hashlib.sha256()
+    """Hash of this file, which says how to compile, and of every kernel file of this package and of `folder`."""
+    digest = hashlib.sha256(Path(__file__).read_bytes())
     for home in sorted({Path(__file__).parent, folder}):
         for path in sorted(home.glob("*_kernels.py")):
             digest.update(path.read_bytes())

@@ -199,13 +199,11 @@ def residuals(
             - 2.0 * total * (row_sum[row, size] - row_sum[row, column])
             + (row_square_sum[row, size] - row_square_sum[row, column])
         )
-    return loss
+    return loss if not loss < 0.0 else 0.0  # differences of prefix sums may round to less than nothing
 
 
 @kernel
-def gather_gradient(
-    points: FloatArray, edges: IntArray, size: int, work: Workspace, gradient: FloatArray
-) -> None:
+def gather_gradient(points: FloatArray, edges: IntArray, size: int, work: Workspace, gradient: FloatArray) -> None:
     """Add sum over touched cells of residual * d coverage / d position (per pixel) to `gradient` (V, 2); clear `work`.
 
     Half the gradient of the sum of squares after `residuals`; the vector-Jacobian product for any other `area`.

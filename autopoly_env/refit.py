@@ -15,6 +15,7 @@ from functools import lru_cache
 import numpy as np
 
 from autopoly_env import refit_kernels
+from autopoly_env.errors import MeshError
 from autopoly_env.mesh import PolyMesh, Topology
 from autopoly_env.parallel import map_threads
 from autopoly_env.raster import workspace
@@ -75,7 +76,10 @@ def refit(mesh: PolyMesh, target: RefitTarget, config: RefitConfig = FROM_AFAR) 
     The result is finite, its loss is at most that of `mesh`, and unless `config.keep_defects` it has no more
     self-intersections and no more flipped faces. Vertices that would gain nothing stay bit for bit where they are;
     vertices off the boundary follow their neighbours. Positions stay in the unit square, if they started there.
+    Raises MeshError for vertices that are not finite.
     """
+    if not np.isfinite(mesh.vertices).all():
+        raise MeshError("the mesh to refit has vertices that are not finite: give finite positions")
     shape = shape_of(mesh.topology)
     moved = np.empty_like(mesh.vertices)
     before, after, n_evaluations = refit_kernels.refit(
@@ -83,13 +87,13 @@ def refit(mesh: PolyMesh, target: RefitTarget, config: RefitConfig = FROM_AFAR) 
         shape,
         target.pictures,
         Settings(
-            config.first_level,
-            config.n_near,
-            config.n_far,
-            config.stiffness,
-            config.damping,
-            config.tolerance,
-            config.keep_defects,
+            int(config.first_level),
+            int(config.n_near),
+            int(config.n_far),
+            float(config.stiffness),
+            float(config.damping),
+            float(config.tolerance),
+            bool(config.keep_defects),
         ),
         workspace(target.resolution, len(shape.loops)),
         moved,
@@ -97,9 +101,7 @@ def refit(mesh: PolyMesh, target: RefitTarget, config: RefitConfig = FROM_AFAR) 
     return RefitResult(mesh.with_vertices(moved), before, after, n_evaluations)
 
 
-def refit_many(
-    meshes: Iterable[PolyMesh], target: RefitTarget, config: RefitConfig = FROM_AFAR
-) -> list[RefitResult]:
+def refit_many(meshes: Iterable[PolyMesh], target: RefitTarget, config: RefitConfig = FROM_AFAR) -> list[RefitResult]:
     """`refit` of many meshes on all cores; the result does not depend on how many there are."""
     return map_threads(lambda mesh: refit(mesh, target, config), meshes)
 

@@ -22,6 +22,7 @@ from autopoly_env.raster_kernels import (
 
 _MIN_FACE_AREA = 1e-9
 _FIRST_RATE, _LAST_RATE = 2.0 / 64.0, 0.1 / 64.0  # of the far phase, in unit-square lengths
+_IDLE_SHARE = .03  # of the steepest slope: below it the far phase slows down, or idle vertices would race along edges
 _MAX_MOVE = 4.0  # of a vertex in one step of the near phase, in pixels of the level
 
 
@@ -62,11 +63,13 @@ class Progress(NamedTuple):
     """The best sane mesh found so far, in arrays that the kernels write to."""
 
     points: FloatArray  # (V, 2)
-    record: FloatArray  # (4,) loss at the current level; crossings and flipped faces of the start; evaluations
+    record: FloatArray  # (6,) loss at the current level; crossings, flipped faces allowed; evaluations; box low, high
 
 
 @kernel
-def _spread(start: FloatArray, unknowns: FloatArray, shape: Shape, points: FloatArray) -> None:
+def _spread(
+    start: FloatArray, unknowns: FloatArray, shape: Shape, low: float, high: float, points: FloatArray
+) -> None:
     """Write all V positions: boundary vertices from `unknowns`, inner ones moved by their neighbours' mean move."""
     points[:] = start
     for n in range(shape.boundary.shape[0]):
@@ -83,7 +86,7 @@ def _spread(start: FloatArray, unknowns: FloatArray, shape: Shape, points: Float
                 for m in range(first, last):
                     u = shape.neighbours[m]
                     move += points[u, axis] - start[u, axis]
-                points[v, axis] = start[v, axis] + move / (last - first)
+                points[v, axis] = min(max(start[v, axis] + move / (last - first), low), high)
 
 
 @kernel
@@ -102,7 +105,7 @@ def _offer(
     start: FloatArray, unknowns: FloatArray, shape: Shape, loss: float, trial: FloatArray, best: Progress
 ) -> bool:
     """Keep the mesh if it is sane and its loss is the least so far; say whether it is sane."""
-    _spread(start, unknowns, shape, trial)
+    _spread(start, unknowns, shape, best.record[4], best.record[5], trial)
     crossings, flipped = defects(trial, shape)
     sane = crossings <= best.record[1] and flipped <= best.record[2]
     if sane and loss < best.record[0]:
@@ -142,13 +145,18 @@ def far_phase(
             _offer(start, unknowns, shape, loss, trial, best)
         mean_left *= 0.9
         square_left *= 0.95
+        steepest = 0.0
         for v in range(n):
             for axis in range(2):
                 g = gradient[v, axis]
                 mean[v, axis] = 0.9 * mean[v, axis] + 0.1 * g
                 square[v, axis] = 0.95 * square[v, axis] + 0.05 * g * g
-                move = mean[v, axis] / (1.0 - mean_left)
-                move *= rate / (np.sqrt(square[v, axis] / (1.0 - square_left)) + 1e-3)
+                steepest = max(steepest, square[v, axis])
+        floor = _IDLE_SHARE * np.sqrt(steepest / (1.0 - square_left)) + 1e-3
+        for v in range(n):
+            for axis in range(2):
+                move = rate * mean[v, axis] / (1.0 - mean_left)
+                move /= np.sqrt(square[v, axis] / (1.0 - square_left)) + floor
                 unknowns[v, axis] = min(max(unknowns[v, axis] - move, low), high)
         rate *= decay
 
@@ -318,9 +326,10 @@ def refit(
             low, high = min(low, start[v, axis]), max(high, start[v, axis])
     fine = pyramid[len(pyramid) - 1]
     crossings, flipped = defects(start, shape)
-    best = Progress(start.copy(), np.zeros(4))
+    best = Progress(start.copy(), np.zeros(6))
     best.record[1] = 1e9 if settings.keep_defects else crossings
     best.record[2] = 1e9 if settings.keep_defects else flipped
+    best.record[4], best.record[5] = low, high
     loss_before = _loss(unknowns, shape, fine, work, scratch)
 
     _descend(start, unknowns, shape, pyramid, settings.first_level, settings, low, high, work, trial, best)
@@ -354,9 +363,7 @@ def _descend(
     for level in range(max(0, first_level), last + 1):
         stiffness = 0.0 if level == last else settings.stiffness * 0.3 ** max(0, level - 1)
         _rebase(shape, pyramid[level], work, scratch, best)
-        near_phase(
-            start, unknowns, shape, pyramid[level], stiffness, False, settings, low, high, work, trial, best
-        )
+        near_phase(start, unknowns, shape, pyramid[level], stiffness, False, settings, low, high, work, trial, best)
 
 
 @kernel

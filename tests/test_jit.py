@@ -1,0 +1,180 @@
+"""Compiled once on a machine whatever becomes of the cache, and the one pool of threads."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from autopoly_env import jit, parallel
+from autopoly_env.errors import ConfigError
+from autopoly_env.parallel import map_threads, n_threads, set_threads
+
+PACKAGE = Path(jit.__file__).parent
+INNER = "from autopoly_env.jit import kernel\n\n@kernel\ndef factor() -> float:\n    return {factor}\n"
+OUTER = (
+    "from autopoly_env.inner_kernels import factor\nfrom autopoly_env.jit import kernel\n\n"
+    "@kernel\ndef scaled(x: float) -> float:\n    return factor() * x\n"
+)
+CALL = "from autopoly_env.outer_kernels import scaled; print(scaled(10.0))"
+TWICE = "from autopoly_env.outer_kernels import scaled; print(scaled(10.0), scaled(10))"
+QUIET, LOUD = 0, 1  # announcements
+
+
+def run_python(code: str, package_parent: Path, **variables: str) -> tuple[str, int]:
+    """(What a process that imports the package from there prints, how often it says that it compiles)."""
+    environment = {name: value for name, value in os.environ.items() if not name.startswith(("NUMBA", "AUTOPOLY"))}
+    environment |= {"PYTHONPATH": str(package_parent), **variables}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment, cwd=package_parent, capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    lines = done.stderr.splitlines()
+    assert all("compiling" in line for line in lines)
+    return done.stdout.strip(), len(lines)
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    """A package of two tiny kernel files, one of which inlines the other, and the real `jit`."""
+    folder = tmp_path / "autopoly_env"
+    folder.mkdir()
+    shutil.copy(PACKAGE / "jit.py", folder)
+    (folder / "__init__.py").write_text("")
+    (folder / "inner_kernels.py").write_text(INNER.format(factor=2.0))
+    (folder / "outer_kernels.py").write_text(OUTER)
+    return folder
+
+
+def test_second_process__does_not_compile_until_a_kernel_file_changes(package: Path, tmp_path: Path) -> None:
+    cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    assert run_python(CALL, tmp_path, **cache) == ("20.0", LOUD)
+    assert run_python(CALL, tmp_path, **cache) == ("20.0", QUIET)
+    (package / "inner_kernels.py").write_text(INNER.format(factor=3.0))
+    assert run_python(CALL, tmp_path, **cache) == ("30.0", LOUD)  # although outer_kernels.py is the same
+    assert run_python(CALL, tmp_path, **cache) == ("30.0", QUIET)
+
+
+def test_damaged_cache__is_replaced(package: Path, tmp_path: Path) -> None:
+    cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    assert run_python(CALL, tmp_path, **cache) == ("20.0", LOUD)
+    index, data = (sorted((tmp_path / "cache").rglob(f"*.{kind}")) for kind in ("nbi", "nbc"))
+    assert len(index) == len(data) == 2
+    for path, size in zip((*index, *data), (0, 40, 0, 500), strict=True):
+        path.write_bytes(path.read_bytes()[:size])
+    assert run_python(CALL, tmp_path, **cache) == ("20.0", LOUD)
+    assert run_python(CALL, tmp_path, **cache) == ("20.0", QUIET)
+
+
+def test_unwritable_cache__means_compiling_in_every_process_and_saying_so(package: Path, tmp_path: Path) -> None:
+    """No folder can be made below a regular file, not even by root."""
+    (tmp_path / "file").touch()
+    (package / "__pycache__").touch()
+    nowhere = str(tmp_path / "file" / "cache")
+    variables = {"NUMBA_CACHE_DIR": nowhere, "HOME": nowhere, "XDG_CACHE_HOME": nowhere}
+    for _ in range(2):
+        assert run_python(TWICE, tmp_path, **variables) == ("20.0 20.0", LOUD)
+
+
+def test_cache__gives_each_signature_its_own_code_when_two_processes_fill_it_together(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Both read the empty index before either has written anything, and their writes interleave."""
+    one, other, reader = (jit._CacheFile(str(tmp_path), "kernel", b"source") for _ in range(3))
+    save_data = one._save_data
+
+    def interrupted(name: str, data: str) -> None:
+        other.save("int", "code for int")
+        save_data(name, data)
+
+    monkeypatch.setattr(other, "_load_index", dict)
+    monkeypatch.setattr(one, "_save_data", interrupted)
+    one.save("float", "code for float")
+    assert reader.load("int") in (None, "code for int")
+    assert reader.load("float") == "code for float"
+
+
+def test_cache__never_shows_the_code_of_an_older_source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    old, new, reader = (jit._CacheFile(str(tmp_path), "kernel", source) for source in (b"old", b"new", b"new"))
+    old.save("float", "old code")
+    found = []
+    save_data, save_index = new._save_data, new._save_index
+
+    def look_first(name: str, data: str) -> None:
+        found.append(reader.load("float"))
+        save_data(name, data)
+
+    def look_after(entries: dict[str, str]) -> None:
+        save_index(entries)
+        found.append(reader.load("float"))
+
+    monkeypatch.setattr(new, "_save_data", look_first)
+    monkeypatch.setattr(new, "_save_index", look_after)
+    new.save("float", "new code")
+    assert found == [None, "new code"]
+
+
+def test_kernels__all_go_through_this_cache() -> None:
+    rooms = [PACKAGE, *(PACKAGE.parent / room for room in ("agents", "training"))]
+    sources = [path for room in rooms for path in room.rglob("*.py") if path.name != "jit.py"]
+    assert not [path.name for path in sources if "njit" in path.read_text()]
+    assert not [path.name for path in sources if "@kernel" in path.read_text() and "_kernels" not in path.name]
+
+
+# --- threads ---
+
+
+@pytest.fixture
+def default_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("AUTOPOLY_THREADS", raising=False)
+    monkeypatch.setattr(parallel, "_override", None)
+
+
+@pytest.mark.usefixtures("default_threads")
+def test_n_threads__is_what_was_set_last(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert 1 <= n_threads() <= (os.cpu_count() or 1)
+    monkeypatch.setenv("AUTOPOLY_THREADS", "5")
+    assert n_threads() == 5
+    set_threads(3)
+    assert n_threads() == 3
+    set_threads(None)
+    assert n_threads() == 5
+
+
+@pytest.mark.usefixtures("default_threads")
+@pytest.mark.parametrize("given", ["0", "-1", "two", "1.5", " "])
+def test_n_threads__refuses_a_senseless_variable(given: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("AUTOPOLY_THREADS", given)
+    with pytest.raises(ConfigError, match="AUTOPOLY_THREADS"):
+        n_threads()
+
+
+def test_set_threads__refuses_none_at_all() -> None:
+    with pytest.raises(ConfigError, match="at least 1"):
+        set_threads(0)
+
+
+@pytest.mark.usefixtures("default_threads")
+@pytest.mark.parametrize("threads", [1, 2, 3])
+def test_map_threads__keeps_the_order_and_passes_errors_on(threads: int) -> None:
+    set_threads(threads)
+    assert map_threads(lambda x: x * x, iter(range(20))) == [x * x for x in range(20)]
+    assert map_threads(str, []) == []
+    with pytest.raises(ZeroDivisionError):
+        map_threads(lambda x: 1 // x, [2, 1, 0, 3])
+    assert map_threads(str, [1]) == ["1"]
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="nothing forks here")
+def test_map_threads__works_in_a_forked_child_of_a_process_that_has_used_it(tmp_path: Path) -> None:
+    code = (
+        "import os, signal; from autopoly_env.parallel import map_threads; map_threads(str, range(9));"
+        "child = os.fork(); signal.alarm(10);"  # so that neither hangs
+        "child or os._exit(map_threads(abs, [0, 0, 7])[2]);"
+        "print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(PACKAGE.parent), "AUTOPOLY_THREADS": "2"}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=20)
+    assert done.stdout == "7\n"
