@@ -2,7 +2,7 @@
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from autopoly_env.actions import Action
@@ -24,7 +24,7 @@ class Decision:
 
 @dataclass(frozen=True)
 class Budget:
-    """How much work a solve may do; None is no limit. It is looked at between steps, so it is overrun by one at most."""
+    """How much work a solve may do; None is no limit. It is looked at between steps: one may overrun it."""
 
     refits: int | None = None
     seconds: float | None = None
@@ -55,7 +55,7 @@ class Stats:
 
 @dataclass(frozen=True)
 class Solution:
-    """The best shape that an agent found, and the sequence that builds it; scored at the silhouette's own resolution."""
+    """The best shape found, and the sequence that builds it; scored at the silhouette's own resolution."""
 
     sequence: ConstructionSequence
     mesh: PolyMesh
@@ -95,6 +95,14 @@ class Meter:
         elif self._budget.seconds is not None and time.perf_counter() - self._began >= self._budget.seconds:
             self.stopped_by = "seconds"
         return self.stopped_by != "finished"
+
+    def rest(self) -> Budget:
+        """What is left of the budget."""
+        seconds, refits = self._budget.seconds, self._budget.refits
+        return Budget(
+            None if refits is None else max(0, refits - self._n_refits),
+            None if seconds is None else max(0.0, seconds - (time.perf_counter() - self._began)),
+        )
 
     def stats(self) -> Stats:
         """The work so far."""
@@ -139,40 +147,27 @@ class Agent(ABC):
         `stats.stopped_by` "interrupted".
         """
         meter = Meter(budget or Budget(), on_progress)
-        track = Track(simulator.initial())
-        meter.add([track.state])
+        best = Track(simulator.initial())
         try:
-            track = self._search(simulator, track, meter)
-        except _Interrupted as interruption:
-            track = interruption.best
-            meter.stopped_by = "interrupted"
-        return finish(simulator, track.states(), meter)
-
-    def _search(self, simulator: Simulator, track: Track, meter: Meter) -> Track:
-        """Play from `track` on; return the track with the best state."""
-        best = track
-        try:
-            while not track.state.done and not meter.spent():
-                state = simulator.transition(track.state, self.act(simulator, track.state).action)
-                meter.add([state])
-                track = Track(state, track)
-                if state.score.total > best.state.score.total:
+            meter.add([best.state])
+            for track in self._search(simulator, best, meter):
+                if track.state.score.total > best.state.score.total:
                     best = track
         except KeyboardInterrupt:
-            raise _Interrupted(best) from None
-        return best
+            meter.stopped_by = "interrupted"
+        return finish(simulator, best.states(), meter)
 
-
-class _Interrupted(Exception):
-    """Ctrl-C, with the best that was found until then."""
-
-    def __init__(self, best: Track) -> None:
-        super().__init__("interrupted")
-        self.best = best
+    def _search(self, simulator: Simulator, track: Track, meter: Meter) -> Iterator[Track]:
+        """Play from `track` on until it is over or the budget is spent; yield what might be the best so far."""
+        while not track.state.done and not meter.spent():
+            state = simulator.transition(track.state, self.act(simulator, track.state).action)
+            meter.add([state])
+            track = Track(state, track)
+            yield track
 
 
 def finish(simulator: Simulator, states: Sequence[State], meter: Meter) -> Solution:
-    """The solution whose construction is `states`: the last mesh polished, all scores at the silhouette's resolution."""
+    """The solution that `states` construct, the last mesh polished, scored at the silhouette's own resolution."""
     meshes = [state.mesh for state in states]
     meshes[-1] = simulator.polish(meshes[-1])
     scores = [simulator.final_score(mesh) for mesh in meshes]

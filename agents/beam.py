@@ -1,9 +1,9 @@
 """`greedy` and `beam`: keep the w best shapes, try everything on each, go on for a while where nothing improves."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from agents.base import Agent, Decision, Meter, Track, _Interrupted
+from agents.base import Agent, Decision, Meter, Track
 from autopoly_env.actions import STOP
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import canonical_hash
@@ -39,22 +39,19 @@ class BeamAgent(Agent):
             return Decision(STOP, value=state.score.total)
         return Decision(best.action, value=best.score.total)
 
-    def _search(self, simulator: Simulator, track: Track, meter: Meter) -> Track:
-        best, kept, failures = track, [track], 0
-        try:
-            while kept and failures < self._config.patience and not meter.spent():
-                tracks = []
-                for parent in kept:
-                    children = simulator.transition_all(parent.state)
-                    meter.add(children)
-                    tracks += [Track(child, parent) for child in children]
-                kept = self._select(tracks)
-                failures += 1
-                if kept and kept[0].state.score.total > best.state.score.total:
-                    best, failures = kept[0], 0
-        except KeyboardInterrupt:
-            raise _Interrupted(best) from None
-        return best
+    def _search(self, simulator: Simulator, track: Track, meter: Meter) -> Iterator[Track]:
+        best_total, kept, failures = track.state.score.total, [track], 0
+        while kept and failures < self._config.patience and not meter.spent():
+            tracks = []
+            for parent in kept:
+                children = [Track(child, parent) for child in simulator.transition_all(parent.state)]
+                yield from children
+                meter.add([child.state for child in children])
+                tracks += children
+            kept = self._select(tracks)
+            failures += 1
+            if kept and kept[0].state.score.total > best_total:
+                best_total, failures = kept[0].state.score.total, 0
 
     def _select(self, tracks: Iterable[Track]) -> list[Track]:
         """The `width` best of them, best first, no shape twice."""

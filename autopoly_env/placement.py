@@ -18,7 +18,7 @@ from autopoly_env.errors import IllegalActionError
 from autopoly_env.holes import HoleChoice, plan_hole
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.edits import HOLE_SIDES, Choice
-from autopoly_env.operators import OPERATORS
+from autopoly_env.operators import OPERATORS, n_elements
 from autopoly_env.placement_kernels import (
     AREA,
     COV_XY,
@@ -106,9 +106,11 @@ def starts(disagreement: Disagreement, action: Action) -> list[Start]:
     None has more crossings or flipped faces than the operator's own result. Raises IllegalActionError as the operator.
     """
     mesh, operator = disagreement.mesh, OPERATORS[action.operator]
+    if not 0 <= action.element < n_elements(mesh, operator.element):
+        operator.apply(mesh, action.element)  # raises
     if action.operator == "face_hole":
-        choice = _hole_choice(disagreement, action.element)
-        return [(choice, operator.apply(mesh, action.element, choice))]
+        hole = _hole_choice(disagreement, action.element)
+        return [(hole, operator.apply(mesh, action.element, hole))]
     choice = operator.choose(mesh, action.element)
     plain = operator.apply(mesh, action.element, choice)
     row = disagreement.row_of_edge.get(action.element, -1)
@@ -159,17 +161,17 @@ def _hole_choice(disagreement: Disagreement, element: int) -> HoleChoice | None:
     face, n_sides = element // len(HOLE_SIDES), HOLE_SIDES[element % len(HOLE_SIDES)]
     region = disagreement.excess_in(face)
     if region is not None:
-        for points in _hole_shapes(region, n_sides):
-            choice = plan_hole(disagreement.mesh, face, points)
-            if choice is not None:
-                return choice
+        for points in hole_shapes(region, n_sides):
+            planned = plan_hole(disagreement.mesh, face, points)
+            if planned is not None:
+                return planned
     choice = OPERATORS["face_hole"].choose(disagreement.mesh, element)
     if not isinstance(choice, HoleChoice):
         raise IllegalActionError(f"face_hole cannot work on face {face}: no hole with two bridges fits into it")
     return choice
 
 
-def _hole_shapes(region: FloatArray, n_sides: int) -> Iterator[FloatArray]:
+def hole_shapes(region: FloatArray, n_sides: int) -> Iterator[FloatArray]:
     """Holes to try: one with the region's principal axes, then a regular one in its inscribed circle."""
     moments = np.array([[region[VAR_X], region[COV_XY]], [region[COV_XY], region[VAR_Y]]])
     spread, axes = np.linalg.eigh(moments)
@@ -195,4 +197,3 @@ def leaves_outline_alone(mesh: PolyMesh, action: Action) -> bool:
     if action.operator in ("face_split", "edge_dissolve"):
         return True
     return action.operator == "edge_subdivide" and not bool(mesh.topology.is_boundary_edge[action.element])
-

@@ -6,20 +6,24 @@ each, all are refitted together, and the outline with the best score is told as 
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain, count
 
 import numpy as np
 
 from agents.base import Agent, Budget, Decision, Meter, Progress, Solution, finish
-from agents.trace.construct import construct
+from agents.trace.construct import UnbuildableError, construct
 from agents.trace.outline import Outline, outline_of
+from agents.trace.reach import Reach
 from agents.trace.rings import Ring, signed_area, trace_rings
 from agents.trace.simplify import Contour
 from autopoly_env.actions import STOP
+from autopoly_env.errors import ConfigError
 from autopoly_env.refit import RefitConfig, RefitTarget
-from autopoly_env.simulator import Simulator, State
 from autopoly_env.score import ScoreWeights
+from autopoly_env.simulator import Simulator, State
 
 _REFITS = (RefitConfig(first_level=2), RefitConfig(first_level=1, n_far=60))
+_HIGHEST_PRICE = 1000.0
 
 
 @dataclass(frozen=True)
@@ -28,6 +32,12 @@ class TraceConfig:
 
     prices: tuple[float, ...] = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)  # of a vertex, in units of its cost in score
     n_constructed: int = 3  # outlines that are built, the best first, until one keeps all of its rings
+
+    def __post_init__(self) -> None:
+        if not self.prices or not self.prices[0] > 0.0 or list(self.prices) != sorted(self.prices):
+            raise ConfigError(f"prices {self.prices}: expected at least one, positive and ascending")
+        if self.n_constructed < 1:
+            raise ConfigError(f"n_constructed {self.n_constructed}: expected at least 1")
 
 
 class TraceAgent(Agent):
@@ -49,45 +59,52 @@ class TraceAgent(Agent):
         on_progress: Callable[[Progress], None] | None = None,
     ) -> Solution:
         meter = Meter(budget or Budget(), on_progress)
-        outlines = self.outlines(simulator, meter)
+        outlines: list[Outline] = []
+        try:
+            for outline in self.outlines(simulator, meter):
+                outlines.append(outline)
+        except KeyboardInterrupt:
+            meter.stopped_by = "interrupted"
         if not outlines:
             return finish(simulator, [simulator.initial()], meter)
+        outlines.sort(key=lambda outline: -final_total(simulator, outline))
         return finish(simulator, build_best(simulator, outlines, self._config.n_constructed), meter)
 
-    def outlines(self, simulator: Simulator, meter: Meter) -> list[Outline]:
-        """All outlines of the sweep, refitted or not, the best score first."""
-        rings = trace_rings(simulator.silhouette)
-        if not rings:
-            return []
+    def outlines(self, simulator: Simulator, meter: Meter) -> Iterator[Outline]:
+        """All outlines of the sweep that can be built, each refitted in two ways and then as it was."""
         target = RefitTarget.of(simulator.silhouette, simulator.resolution)
-        found = []
-        for outline in self._sweep(simulator, rings):
-            fitted = [outline.refitted(target, config) for config in _REFITS]
-            found += [outline, *fitted]
-            meter.count(len(fitted), max(final_total(simulator, o) for o in (outline, *fitted)))
+        reach = Reach.of(simulator)
+        for outline in self._sweep(simulator, trace_rings(simulator.silhouette), reach):
             if meter.spent():
-                break
-        return sorted(found, key=lambda outline: -final_total(simulator, outline))
+                return
+            found = [*(outline.refitted(target, config) for config in _REFITS), outline]
+            meter.count(len(_REFITS), max(final_total(simulator, o) for o in found))
+            yield from found
 
-    def _sweep(self, simulator: Simulator, rings: Sequence[Ring]) -> Iterator[Outline]:
+    def _sweep(self, simulator: Simulator, rings: Sequence[Ring], reach: Reach) -> Iterator[Outline]:
+        """Outlines from cheap to dear vertices; past the last price on, until one can be built."""
+        if not rings:
+            return
         contours = [Contour(ring.points) for ring in rings]
         area = float(simulator.silhouette.mask.mean())
-        seen = set()
-        for price in self._config.prices:
-            weights = ScoreWeights(w_sc=simulator.weights.w_sc * price)
-            sizes = tuple(choose_sizes(rings, contours, weights, area, "face_hole" in simulator.operators))
+        prices = self._config.prices
+        seen: set[tuple[int, ...]] = set()
+        found = False
+        for price in chain(prices, (prices[-1] * 2.0**k for k in count(1))):
+            if price > prices[-1] and (found or price > _HIGHEST_PRICE):
+                return
+            weights = ScoreWeights(simulator.weights.w_sm, simulator.weights.w_sc * price)
+            sizes = tuple(choose_sizes(rings, contours, weights, area, reach))
             if sizes not in seen:
                 seen.add(sizes)
-                kept = [k for k, size in enumerate(sizes) if size]
-                polygons = [Ring(contours[k].polygon(sizes[k]), rings[k].parent) for k in kept]
-                among = list(rings)
-                for k, polygon in zip(kept, polygons, strict=True):
-                    among[k] = polygon
-                yield outline_of(polygons, among)
+                outline = _outline(rings, contours, sizes)
+                if reach.allows(outline):
+                    found = True
+                    yield outline
 
 
 def choose_sizes(
-    rings: Sequence[Ring], contours: Sequence[Contour], weights: ScoreWeights, area: float, with_holes: bool
+    rings: Sequence[Ring], contours: Sequence[Contour], weights: ScoreWeights, area: float, reach: Reach
 ) -> Iterator[int]:
     """How many vertices each ring is worth, 0 for none; `area` is the silhouette's, in the unit square.
 
@@ -95,18 +112,24 @@ def choose_sizes(
     """
     kept: set[int] = set()
     for k, (ring, contour) in enumerate(zip(rings, contours, strict=True)):
-        if ring.is_hole and (not with_holes or ring.parent not in kept):
-            yield 0
-            continue
         errors = contour.errors
+        sizes = [n for n in reach.sizes(ring, k) if n < len(errors)] if k == 0 or ring.parent in kept | {-1} else []
         extra = 3 if ring.is_hole else 1  # edges and faces beyond one edge a vertex
-        cost = weights.w_sm * errors / area + weights.w_sc * (2 * np.arange(len(errors)) + extra)
-        size = int(np.argmin(cost))
-        if k > 0 and cost[size] >= weights.w_sm * abs(signed_area(ring.points)) / area:
+        costs = [weights.w_sm * errors[n] / area + weights.w_sc * (2 * n + extra) for n in sizes]
+        worth_it = k == 0 or (sizes and min(costs) < weights.w_sm * abs(signed_area(ring.points)) / area)
+        if not sizes or not worth_it:
             yield 0
             continue
         kept.add(k)
-        yield size
+        yield sizes[int(np.argmin(costs))]
+
+
+def _outline(rings: Sequence[Ring], contours: Sequence[Contour], sizes: Sequence[int]) -> Outline:
+    among = [
+        Ring(contour.polygon(size), ring.parent) if size else ring
+        for ring, contour, size in zip(rings, contours, sizes, strict=True)
+    ]
+    return outline_of([ring for ring, size in zip(among, sizes, strict=True) if size], among)
 
 
 def final_total(simulator: Simulator, outline: Outline) -> float:
@@ -115,15 +138,22 @@ def final_total(simulator: Simulator, outline: Outline) -> float:
 
 
 def build_best(simulator: Simulator, outlines: Sequence[Outline], n_most: int) -> list[State]:
-    """The best construction of the first outlines, which come best first; stops at the first that loses nothing."""
+    """The best construction of the first `n_most` outlines that can be built, else the initial rectangle.
+
+    The outlines come best first; it stops at the first that loses nothing.
+    """
     best: list[State] = []
     best_total = float("-inf")
-    for outline in outlines[:n_most]:
-        expected = final_total(simulator, outline)
-        if expected <= best_total:
+    n_built = 0
+    for outline in outlines:
+        if n_built == n_most or final_total(simulator, outline) <= best_total:
             break
-        states = construct(simulator, outline.rings)
+        try:
+            states = construct(simulator, outline.rings)
+        except UnbuildableError:
+            continue
+        n_built += 1
         total = simulator.final_score(states[-1].mesh).total
         if total > best_total:
             best, best_total = states, total
-    return best
+    return best or [simulator.initial()]

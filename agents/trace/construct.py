@@ -25,7 +25,7 @@ from autopoly_env.simulator import Simulator, State
 _N_NATURAL_TRIES = 200  # ways to grow a further part out of the mesh that are tried before it is put in place at once
 
 
-class _Unbuildable(AutoPolyError):
+class UnbuildableError(AutoPolyError):
     """A ring that the operators cannot reach without crossings."""
 
 
@@ -33,6 +33,8 @@ class _Builder:
     """The states of a construction in the making."""
 
     def __init__(self, simulator: Simulator, start: PolyMesh) -> None:
+        if defects_of(start) != (0, 0):
+            raise UnbuildableError("the main outline crosses itself")
         self.simulator = simulator
         self.states = [State(start, simulator.score(start), n_refits=0)]
 
@@ -40,9 +42,7 @@ class _Builder:
     def mesh(self) -> PolyMesh:
         return self.states[-1].mesh
 
-    def attempt(
-        self, name: str, element: int, choice: Choice | None, moves: dict[int, FloatArray]
-    ) -> PolyMesh | None:
+    def attempt(self, name: str, element: int, choice: Choice | None, moves: dict[int, FloatArray]) -> PolyMesh | None:
         """The mesh after an operator and `moves` (vertex id to position), if it is legal and sane."""
         try:
             made = OPERATORS[name].apply(self.mesh, element, choice)
@@ -54,11 +54,13 @@ class _Builder:
         moved = made.with_vertices(vertices)
         return moved if defects_of(moved) == (0, 0) else None
 
-    def do(self, name: str, element: int, choice: Choice | None = None, moves: dict[int, FloatArray] | None = None) -> None:
-        """Take the step, or raise _Unbuildable."""
+    def do(
+        self, name: str, element: int, choice: Choice | None = None, moves: dict[int, FloatArray] | None = None
+    ) -> None:
+        """Take the step, or raise UnbuildableError."""
         mesh = self.attempt(name, element, choice, moves or {})
         if mesh is None:
-            raise _Unbuildable(f"{name} on element {element} leaves a crossing")
+            raise UnbuildableError(f"{name} on element {element} leaves a crossing")
         if choice is None:
             choice = OPERATORS[name].choose(self.mesh, element)
         step = self.states[-1].step + 1
@@ -73,7 +75,7 @@ class _Builder:
 def construct(simulator: Simulator, rings: Sequence[Ring]) -> list[State]:
     """The states that build as many of the rings as the simulator's operators allow; `rings[0]` is the main outline.
 
-    A ring that cannot be built without a crossing is left out.
+    A ring that cannot be built without a crossing is left out; UnbuildableError is raised where that is the main one.
     """
     main = rings[0].points
     order, coarse = _peeled(main, np.empty((0, 4)), [], 4)
@@ -88,16 +90,14 @@ def construct(simulator: Simulator, rings: Sequence[Ring]) -> list[State]:
             kept = len(builder.states)
             try:
                 _add_part(builder, ring.points)
-            except _Unbuildable:
+            except UnbuildableError:
                 del builder.states[kept:]
                 continue
             _cut_holes(builder, [r.points for r in rings if r.parent == index])
     return builder.states
 
 
-def _peeled(
-    points: FloatArray, walls: FloatArray, locked: Sequence[int], n_keep: int
-) -> tuple[list[int], list[int]]:
+def _peeled(points: FloatArray, walls: FloatArray, locked: Sequence[int], n_keep: int) -> tuple[list[int], list[int]]:
     """(indices to drop in order, indices left in the polygon's order)."""
     mask = np.zeros(len(points), np.bool_)
     mask[list(locked)] = True
@@ -138,7 +138,7 @@ def _cut_holes(builder: _Builder, holes: Sequence[FloatArray]) -> None:
         kept = len(builder.states)
         try:
             _cut_hole(builder, hole, remaining)
-        except _Unbuildable:
+        except UnbuildableError:
             del builder.states[kept:]
 
 
@@ -146,13 +146,13 @@ def _cut_hole(builder: _Builder, hole: FloatArray, others: Sequence[FloatArray])
     face = _face_around(builder.mesh, hole)
     plan = plan_hole(builder.mesh, face, hole, obstacles=others)
     if plan is None:
-        raise _Unbuildable("no two bridges reach the hole")
+        raise UnbuildableError("no two bridges reach the hole")
     ring = builder.mesh.vertices[list(builder.mesh.faces[face])]
     bridges = [np.concatenate((ring[i], hole[j])) for i, j in plan.bridges]
     walls = np.vstack([_segments_of(builder.mesh), bridges, *map(_ring_segments, others)])
     order, coarse = _peeled(hole, walls, [j for _, j in plan.bridges], 4)
     if len(coarse) > 4:
-        raise _Unbuildable("the hole cannot be coarsened to a quad")
+        raise UnbuildableError("the hole cannot be coarsened to a quad")
     (f, h), (g, i) = plan.bridges
     points = tuple((float(x), float(y)) for x, y in hole[coarse])
     choice = HoleChoice(points, ((f, coarse.index(h)), (g, coarse.index(i))))
@@ -166,7 +166,7 @@ def _face_around(mesh: PolyMesh, hole: FloatArray) -> int:
     for face, cycle in enumerate(mesh.faces):
         if shapely.Polygon(mesh.vertices[list(cycle)]).contains(polygon):
             return face
-    raise _Unbuildable("the hole lies in no single face")
+    raise UnbuildableError("the hole lies in no single face")
 
 
 def _segments_of(mesh: PolyMesh) -> FloatArray:
@@ -182,11 +182,11 @@ def _add_part(builder: _Builder, points: FloatArray) -> None:
     """A part of its own: extrude twice, delete the quad between, refine."""
     operators = builder.simulator.operators
     if "edge_extrude" not in operators or "face_delete" not in operators:
-        raise _Unbuildable("further parts need edge_extrude and face_delete")
+        raise UnbuildableError("further parts need edge_extrude and face_delete")
     order, coarse = _peeled(points, _segments_of(builder.mesh), [], 4)
     triangle = len(coarse) == 3
     if len(coarse) > 4 or (triangle and "vertex_dissolve" not in operators):
-        raise _Unbuildable("the part cannot be coarsened to a quad")
+        raise UnbuildableError("the part cannot be coarsened to a quad")
     quad = np.insert(points, 1, 0.5 * (points[0] + points[1]), axis=0) if triangle else points[coarse]
     ids = _grow_quad(builder, quad)
     if triangle:

@@ -3,10 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
+import shapely
 
-from agents.trace.rings import Ring
+from agents.trace.rings import Ring, signed_area
 from autopoly_env.mesh import PolyMesh, Topology
 from autopoly_env.refit import RefitConfig, RefitTarget, refit
 from autopoly_env.score import Score, ScoreWeights, intersection_over_union, self_intersections
@@ -23,7 +25,7 @@ class Outline:
     def loops(self) -> PolyMesh:
         """The rings as the faces of a mesh, holes wound backwards: its rendering is that of the shape."""
         ends = np.cumsum([0, *(len(ring.points) for ring in self.rings)]).tolist()
-        cycles = tuple(tuple(range(a, b)) for a, b in zip(ends, ends[1:], strict=False))
+        cycles = tuple(tuple(range(a, b)) for a, b in pairwise(ends))
         n, f = ends[-1], len(cycles)
         points = np.concatenate([ring.points for ring in self.rings])
         return PolyMesh(points, Topology(n, cycles), tuple(range(n)), tuple(range(f)), n, f)
@@ -34,6 +36,16 @@ class Outline:
         n_vertices = sum(len(ring.points) for ring in self.rings)
         n_holes = sum(ring.is_hole for ring in self.rings)
         return 2 * n_vertices + 3 * n_holes + (len(self.rings) - n_holes)
+
+    @property
+    def n_steps(self) -> int:
+        """Actions that `construct` takes to build the rings."""
+        n_steps = 0
+        for k, ring in enumerate(self.rings):
+            n = len(ring.points)
+            n_steps += max(n - 4, 0)  # subdivisions
+            n_steps += 1 if ring.is_hole else (3 if k > 0 else 0) + (n == 3)
+        return n_steps
 
     def score(self, target: Target, weights: ScoreWeights) -> Score:
         """The score of the mesh that has these rings, its bridges crossing nothing."""
@@ -69,3 +81,18 @@ def outline_of(kept: Sequence[Ring], among: Sequence[Ring]) -> Outline:
         parent = place[id(among[ring.parent])] if ring.is_hole else -1
         rings.append(Ring(ring.points, parent))
     return Outline(tuple(rings))
+
+
+def outline_of_mesh(mesh: PolyMesh) -> Outline | None:
+    """The outline of a mesh, its largest part first; None where its loops do not nest."""
+    loops = [mesh.vertices[loop] for loop in mesh.topology.boundary_loops]
+    outer = sorted((loop for loop in loops if signed_area(loop) > 0.0), key=signed_area, reverse=True)
+    polygons = [shapely.Polygon(loop) for loop in outer]
+    rings = [Ring(loop, -1) for loop in outer]
+    for hole in (loop for loop in loops if signed_area(loop) < 0.0):
+        middle = shapely.Polygon(hole).representative_point() if shapely.Polygon(hole).is_valid else None
+        inside = [k for k, polygon in enumerate(polygons) if middle is not None and polygon.contains(middle)]
+        if not inside:
+            return None
+        rings.append(Ring(hole, inside[-1]))
+    return Outline(tuple(rings)) if outer else None

@@ -59,7 +59,9 @@ def _may_drop(points: FloatArray, walls: FloatArray, after: IntArray, a: int, i:
         return False
     for w in range(walls.shape[0]):
         ux, uy, vx, vy = walls[w, 0], walls[w, 1], walls[w, 2], walls[w, 3]
-        at_end = (ux == ax and uy == ay) or (vx == ax and vy == ay) or (ux == bx and uy == by) or (vx == bx and vy == by)
+        at_end = (
+            (ux == ax and uy == ay) or (vx == ax and vy == ay) or (ux == bx and uy == by) or (vx == bx and vy == by)
+        )
         if not at_end and segments_touch(ax, ay, bx, by, ux, uy, vx, vy):
             return False
         if _inside(ux, uy, ax, ay, cx, cy, bx, by) or _inside(vx, vy, ax, ay, cx, cy, bx, by):
@@ -77,6 +79,4 @@ def _inside(
     first = orientation(ax, ay, bx, by, px, py)
     second = orientation(bx, by, cx, cy, px, py)
     third = orientation(cx, cy, ax, ay, px, py)
-    return not (
-        (first == 1 or second == 1 or third == 1) and (first == -1 or second == -1 or third == -1)
-    )
+    return not ((first == 1 or second == 1 or third == 1) and (first == -1 or second == -1 or third == -1))

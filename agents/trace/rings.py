@@ -10,6 +10,7 @@ from autopoly_env.arrays import FloatArray
 from autopoly_env.silhouette import Silhouette
 
 TRACE_RESOLUTION = 256  # contours are followed at the silhouette's own resolution, at most this
+_LEVEL = 0.4990123  # about half; a pixel covered by just this much would make contours touch, and none is
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ def trace_rings(silhouette: Silhouette) -> list[Ring]:
     """All contours at half coverage: outer rings first, the largest first, then the holes."""
     size = min(silhouette.resolution, TRACE_RESOLUTION)
     padded = np.pad(silhouette.target(size).coverage, 1)
-    loops = [(line[:-1, ::-1] - 0.5) / size for line in find_contours(padded, 0.5)]
+    loops = [(line[:-1, ::-1] - 0.5) / size for line in find_contours(padded, _LEVEL)]
     loops = [loop for loop in loops if len(loop) >= 3 and abs(signed_area(loop)) > 0.0]
     if not loops:
         return []
@@ -42,10 +43,10 @@ def trace_rings(silhouette: Silhouette) -> list[Ring]:
     outward = 1.0 if signed_area(largest) > 0.0 else -1.0  # the largest contour is an outer one
     oriented = [loop if outward > 0.0 else loop[::-1] for loop in loops]
     outer = sorted((loop for loop in oriented if signed_area(loop) > 0.0), key=signed_area, reverse=True)
-    polygons = [shapely.Polygon(loop) for loop in outer]
+    polygons = np.array([shapely.Polygon(loop) for loop in outer])
     rings = [Ring(loop, -1) for loop in outer]
     for hole in sorted((loop for loop in oriented if signed_area(loop) < 0.0), key=signed_area):
-        inside = [k for k, polygon in enumerate(polygons) if shapely.contains_xy(polygon, *hole[0])]
-        if inside:
-            rings.append(Ring(hole, max(inside)))  # the smallest one around it
+        inside = np.flatnonzero(shapely.contains_xy(polygons, *hole[0]))
+        if len(inside):
+            rings.append(Ring(hole, int(inside[-1])))  # the smallest one around it
     return rings
