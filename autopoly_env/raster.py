@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from autopoly_env import raster_kernels
+from autopoly_env import derivative_kernels, raster_kernels
 from autopoly_env.arrays import FloatArray, IntArray
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
@@ -27,23 +27,15 @@ _SERIAL_PIECES = 50_000  # about so many pieces of boundary take as long as it t
 
 def workspace(resolution: int, n_edges: int) -> Workspace:
     """Scratch arrays of this thread, large enough for B = `n_edges` boundary edges on an R = `resolution` grid."""
-    cells, pieces = resolution * resolution, n_edges * (2 * resolution + 4)
+    cells, pieces = resolution * (resolution + raster_kernels.PADDING), n_edges * (2 * resolution + 4)
     held: Workspace | None = getattr(_local, "workspace", None)
-    if held is not None and len(held.area) >= cells and len(held.piece_edge) >= pieces:
+    if held is not None and len(held.cells) >= cells and len(held.pieces) >= pieces:
         return held
     if held is not None:
-        cells, pieces = max(cells, len(held.area)), max(pieces, len(held.piece_edge))
-    _local.workspace = Workspace(
-        area=np.zeros(cells),
-        cover=np.zeros(cells),
-        touched=np.zeros(cells // 64 + 2 * int(np.sqrt(cells)) + 64, np.uint64),
-        head=np.full(cells, raster_kernels.NO_PIECE, np.int64),
-        piece_edge=np.zeros(pieces, np.int64),
-        piece_next=np.zeros(pieces, np.int64),
-        piece_start=np.zeros(pieces),
-        piece_end=np.zeros(pieces),
-    )
-    return _local.workspace
+        cells, pieces = max(cells, len(held.cells)), max(pieces, len(held.pieces))
+    words = cells // 64 + int(np.sqrt(cells)) + 1  # a last word for each row
+    _local.workspace = Workspace(np.zeros((cells, 4)), np.zeros(words, np.uint64), np.zeros((pieces, 4)))
+    return _local.workspace  # type: ignore[no-any-return]
 
 
 def _check_resolution(resolution: int) -> None:
@@ -72,7 +64,7 @@ def loss_and_gradient(mesh: PolyMesh, target: Target) -> tuple[float, FloatArray
     """
     edges = mesh.topology.boundary_half_edges
     gradient = np.empty_like(mesh.vertices)
-    loss = raster_kernels.loss_and_gradient(
+    loss = derivative_kernels.loss_and_gradient(
         mesh.vertices,
         edges,
         target.resolution,
@@ -137,7 +129,7 @@ def loss_and_gradient_many(meshes: Sequence[PolyMesh], target: Target) -> tuple[
 
     def evaluate(first: int, last: int) -> None:
         work = workspace(target.resolution, _most_edges(batch))
-        raster_kernels.losses_and_gradients(*batch, first, last, *picture, work, losses, gradients)
+        derivative_kernels.losses_and_gradients(*batch, first, last, *picture, work, losses, gradients)
 
     _for_each_part(evaluate, batch, target.resolution)
     starts = batch.point_starts.tolist()
@@ -150,7 +142,7 @@ def coverage_vjp(batch: Batch, cotangents: FloatArray) -> FloatArray:
 
     def pull_back(first: int, last: int) -> None:
         work = workspace(cotangents.shape[1], _most_edges(batch))
-        raster_kernels.vector_jacobians(*batch, first, last, cotangents, work, gradients)
+        derivative_kernels.vector_jacobians(*batch, first, last, cotangents, work, gradients)
 
     _for_each_part(pull_back, batch, cotangents.shape[1])
     return gradients

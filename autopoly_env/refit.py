@@ -36,8 +36,10 @@ class RefitConfig:
     keep_defects: bool = False  # allow new self-intersections and flipped faces
 
 
-FROM_AFAR = RefitConfig(n_far=60)
-LOCAL = RefitConfig(first_level=2)
+DEFAULT = RefitConfig()
+FROM_AFAR = RefitConfig(n_far=60)  # nothing is known of the start
+THOROUGH = RefitConfig(first_level=1, n_far=60)  # the start is roughly right
+LOCAL = RefitConfig(first_level=2)  # the start nearly fits
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ class RefitResult:
     n_evaluations: int  # renderings with derivatives
 
 
-def refit(mesh: PolyMesh, target: RefitTarget, config: RefitConfig = FROM_AFAR) -> RefitResult:
+def refit(mesh: PolyMesh, target: RefitTarget, config: RefitConfig = DEFAULT) -> RefitResult:
     """Move the vertices of `mesh` to match `target`.
 
     The result is finite, its loss is at most that of `mesh`, and unless `config.keep_defects` it has no more
@@ -101,7 +103,7 @@ def refit(mesh: PolyMesh, target: RefitTarget, config: RefitConfig = FROM_AFAR) 
     return RefitResult(mesh.with_vertices(moved), before, after, n_evaluations)
 
 
-def refit_many(meshes: Iterable[PolyMesh], target: RefitTarget, config: RefitConfig = FROM_AFAR) -> list[RefitResult]:
+def refit_many(meshes: Iterable[PolyMesh], target: RefitTarget, config: RefitConfig = DEFAULT) -> list[RefitResult]:
     """`refit` of many meshes on all cores; the result does not depend on how many there are."""
     return map_threads(lambda mesh: refit(mesh, target, config), meshes)
 

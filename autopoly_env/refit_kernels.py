@@ -10,19 +10,14 @@ from typing import NamedTuple
 import numpy as np
 
 from autopoly_env.arrays import FloatArray, IntArray
+from autopoly_env.derivative_kernels import half_gradient, normal_equations
 from autopoly_env.geometry_kernels import count_crossings, face_areas
 from autopoly_env.jit import kernel
-from autopoly_env.raster_kernels import (
-    Workspace,
-    gather_gradient,
-    gather_normal_equations,
-    residuals,
-    walk_boundary,
-)
+from autopoly_env.raster_kernels import Workspace
 
 _MIN_FACE_AREA = 1e-9
 _FIRST_RATE, _LAST_RATE = 2.0 / 64.0, 0.1 / 64.0  # of the far phase, in unit-square lengths
-_IDLE_SHARE = .03  # of the steepest slope: below it the far phase slows down, or idle vertices would race along edges
+_IDLE_SHARE = 0.03  # of the steepest slope: below it the far phase slows down, or idle vertices would race along edges
 _MAX_MOVE = 4.0  # of a vertex in one step of the near phase, in pixels of the level
 
 
@@ -67,9 +62,7 @@ class Progress(NamedTuple):
 
 
 @kernel
-def _spread(
-    start: FloatArray, unknowns: FloatArray, shape: Shape, low: float, high: float, points: FloatArray
-) -> None:
+def _spread(start: FloatArray, unknowns: FloatArray, shape: Shape, low: float, high: float, points: FloatArray) -> None:
     """Write all V positions: boundary vertices from `unknowns`, inner ones moved by their neighbours' mean move."""
     points[:] = start
     for n in range(shape.boundary.shape[0]):
@@ -117,12 +110,16 @@ def _offer(
 @kernel
 def _loss(unknowns: FloatArray, shape: Shape, picture: Picture, work: Workspace, gradient: FloatArray) -> float:
     """Sum of squared coverage errors; half its gradient per pixel goes into `gradient` (N, 2)."""
-    size = picture.coverage.shape[0]
-    walk_boundary(unknowns, shape.loops, size, work)
-    loss = residuals(size, picture.coverage, picture.row_sum, picture.row_square_sum, work)
-    gradient[:] = 0.0
-    gather_gradient(unknowns, shape.loops, size, work, gradient)
-    return loss
+    return half_gradient(
+        unknowns,
+        shape.loops,
+        picture.coverage.shape[0],
+        picture.coverage,
+        picture.row_sum,
+        picture.row_square_sum,
+        work,
+        gradient,
+    )
 
 
 @kernel
@@ -201,11 +198,17 @@ def _normal_equations(
     """Sum of squared coverage errors plus `stiffness` times the squared changes (pixels) of the boundary edges since
     `origin` (N, 2); its half gradient J'r (N, 2) and the lower triangle of J'J (2N, 2N), both per pixel."""
     size = picture.coverage.shape[0]
-    walk_boundary(unknowns, shape.loops, size, work)
-    loss = residuals(size, picture.coverage, picture.row_sum, picture.row_square_sum, work)
-    gradient[:] = 0.0
-    normal[:] = 0.0
-    gather_normal_equations(unknowns, shape.loops, size, work, gradient, normal)
+    loss = normal_equations(
+        unknowns,
+        shape.loops,
+        size,
+        picture.coverage,
+        picture.row_sum,
+        picture.row_square_sum,
+        work,
+        gradient,
+        normal,
+    )
     if stiffness == 0.0:
         return loss
     for e in range(shape.loops.shape[0]):

@@ -12,7 +12,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopoly_env import raster, raster_kernels
+from autopoly_env import derivative_kernels, raster, raster_kernels
 from autopoly_env.arrays import FloatArray, IntArray
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
@@ -51,8 +51,7 @@ def random_target(resolution: int, seed: int = 0) -> Target:
 
 def assert_clean(resolution: int, n_edges: int) -> None:
     work = raster.workspace(resolution, n_edges)
-    assert not work.area.any() and not work.cover.any() and not work.touched.any()
-    assert (work.head == raster_kernels.NO_PIECE).all()
+    assert not work.cells.any() and not work.touched.any()
 
 
 # --- coverage, by hand ---
@@ -288,10 +287,10 @@ def test_normal_equations__equal_those_of_the_dense_jacobian(mesh: PolyMesh) -> 
     residual = (coverage(mesh, size) - target.coverage).ravel()
     work = raster.workspace(size, len(batch.edges))
     gradient, normal = np.zeros((n, 2)), np.zeros((2 * n, 2 * n))
-    raster_kernels.walk_boundary(batch.points, batch.edges, size, work)
-    raster_kernels.residuals(size, target.coverage, target.row_sum, target.row_square_sum, work)
-    raster_kernels.gather_normal_equations(batch.points, batch.edges, size, work, gradient, normal)
+    picture = (target.coverage, target.row_sum, target.row_square_sum)
+    loss = derivative_kernels.normal_equations(batch.points, batch.edges, size, *picture, work, gradient, normal)
     assert_clean(size, len(batch.edges))
+    assert loss == pytest.approx(residual @ residual, rel=1e-12)
     np.testing.assert_allclose(gradient.ravel(), jacobian.T @ residual, rtol=0, atol=1e-12)
     np.testing.assert_allclose(normal, np.tril(jacobian.T @ jacobian), rtol=0, atol=1e-12)
 

@@ -1,0 +1,251 @@
+"""Numba kernels of the rasteriser's derivatives: losses with gradients, normal equations, vector-Jacobian products.
+
+Only touched cells depend on the vertices; the rest of a row is constant spans, whose squared error prefix sums of the
+target give. Letters and units as in `raster_kernels`.
+"""
+
+import numpy as np
+from numba.cpython.unsafe.numbers import trailing_zeros
+
+from autopoly_env.arrays import FloatArray, IntArray
+from autopoly_env.jit import kernel
+from autopoly_env.raster_kernels import (
+    AREA,
+    COVER,
+    EDGE,
+    END,
+    HEAD,
+    NEXT,
+    PADDING,
+    START,
+    Workspace,
+    clear,
+    walk_boundary,
+)
+
+
+@kernel
+def half_gradient(
+    points: FloatArray, edges: IntArray, size: int, coverage: FloatArray, row_sum: FloatArray,
+    row_square_sum: FloatArray, work: Workspace, gradient: FloatArray,
+) -> float:  # fmt: skip
+    """Return the sum over pixels of (coverage - target)**2; write half its gradient per pixel into `gradient` (V, 2).
+
+    `coverage` (R, R) is the target, `row_sum` and `row_square_sum` (R, R+1) prefix sums of it and of its square.
+    """
+    walk_boundary(points, edges, size, work)
+    words = (size + 63) >> 6
+    gradient[:] = 0.0
+    loss = 0.0
+    for row in range(size):
+        total = 0.0
+        column = 0
+        for word in range(words):
+            bits = work.touched[row * words + word]
+            work.touched[row * words + word] = 0
+            while bits != 0:
+                here = word * 64 + int(trailing_zeros(bits))
+                bits &= bits - np.uint64(1)
+                cell = row * (size + PADDING) + here
+                if here > column:
+                    loss += _span_loss(total, row, column, here, row_sum, row_square_sum)
+                residual = total + work.cells[cell, AREA] - coverage[row, here]
+                total += work.cells[cell, COVER]
+                loss += residual * residual
+                _pull(points, edges, size, cell, residual, work, gradient)
+                clear(cell, work)
+                column = here + 1
+        loss += _span_loss(total, row, column, size, row_sum, row_square_sum)
+    return loss if not loss < 0.0 else 0.0  # differences of prefix sums may round to less than nothing
+
+
+@kernel
+def _span_loss(
+    total: float, row: int, first: int, last: int, row_sum: FloatArray, row_square_sum: FloatArray
+) -> float:  # fmt: skip
+    """Squared error of the untouched pixels first..last-1 of a row, which the mesh covers `total` times."""
+    return (
+        total * total * (last - first)
+        - 2.0 * total * (row_sum[row, last] - row_sum[row, first])
+        + (row_square_sum[row, last] - row_square_sum[row, first])
+    )
+
+
+@kernel
+def _pull(
+    points: FloatArray, edges: IntArray, size: int, cell: int, residual: float, work: Workspace, gradient: FloatArray
+) -> None:  # fmt: skip
+    """Add residual * d coverage / d position (per pixel) of one cell to `gradient` (V, 2)."""
+    piece = int(work.cells[cell, HEAD]) - 1
+    while piece >= 0:
+        edge = int(work.pieces[piece, EDGE])
+        i, j = edges[edge, 0], edges[edge, 1]
+        along_x = residual * (points[j, 1] - points[i, 1]) * size
+        along_y = residual * (points[i, 0] - points[j, 0]) * size
+        gradient[i, 0] += work.pieces[piece, START] * along_x
+        gradient[i, 1] += work.pieces[piece, START] * along_y
+        gradient[j, 0] += work.pieces[piece, END] * along_x
+        gradient[j, 1] += work.pieces[piece, END] * along_y
+        piece = int(work.pieces[piece, NEXT]) - 1
+
+
+@kernel
+def loss_and_gradient(
+    points: FloatArray, edges: IntArray, size: int, coverage: FloatArray, row_sum: FloatArray,
+    row_square_sum: FloatArray, work: Workspace, gradient: FloatArray,
+) -> float:  # fmt: skip
+    """Sum of squared coverage errors; its gradient with respect to unit-square positions goes into `gradient`."""
+    loss = half_gradient(points, edges, size, coverage, row_sum, row_square_sum, work, gradient)
+    for v in range(gradient.shape[0]):
+        gradient[v, 0] *= 2.0 * size
+        gradient[v, 1] *= 2.0 * size
+    return loss
+
+
+@kernel
+def normal_equations(
+    points: FloatArray, edges: IntArray, size: int, coverage: FloatArray, row_sum: FloatArray,
+    row_square_sum: FloatArray, work: Workspace, gradient: FloatArray, normal: FloatArray,
+) -> float:  # fmt: skip
+    """As `half_gradient`, and write the lower triangle of J'J (2V, 2V): unknown 2v is x of vertex v, 2v+1 its y."""
+    walk_boundary(points, edges, size, work)
+    words = (size + 63) >> 6
+    vertices = np.empty(points.shape[0], np.int64)
+    rows = np.empty((points.shape[0], 2))
+    gradient[:] = 0.0
+    normal[:] = 0.0
+    loss = 0.0
+    for row in range(size):
+        total = 0.0
+        column = 0
+        for word in range(words):
+            bits = work.touched[row * words + word]
+            work.touched[row * words + word] = 0
+            while bits != 0:
+                here = word * 64 + int(trailing_zeros(bits))
+                bits &= bits - np.uint64(1)
+                cell = row * (size + PADDING) + here
+                if here > column:
+                    loss += _span_loss(total, row, column, here, row_sum, row_square_sum)
+                residual = total + work.cells[cell, AREA] - coverage[row, here]
+                total += work.cells[cell, COVER]
+                loss += residual * residual
+                m = _cell_jacobian(points, edges, size, cell, work, vertices, rows)
+                _add_outer_product(m, residual, vertices, rows, gradient, normal)
+                clear(cell, work)
+                column = here + 1
+        loss += _span_loss(total, row, column, size, row_sum, row_square_sum)
+    return loss if not loss < 0.0 else 0.0
+
+
+@kernel
+def _add_outer_product(
+    m: int, residual: float, vertices: IntArray, rows: FloatArray, gradient: FloatArray, normal: FloatArray
+) -> None:  # fmt: skip
+    """Add one cell's row of the Jacobian, `rows[:m]` at `vertices[:m]`, to J'r and to the lower triangle of J'J."""
+    for a in range(m):
+        u = 2 * vertices[a]
+        jx, jy = rows[a, 0], rows[a, 1]
+        gradient[vertices[a], 0] += residual * jx
+        gradient[vertices[a], 1] += residual * jy
+        normal[u, u] += jx * jx
+        normal[u + 1, u] += jy * jx
+        normal[u + 1, u + 1] += jy * jy
+        for b in range(a):
+            v = 2 * vertices[b]
+            kx, ky = rows[b, 0], rows[b, 1]
+            if v < u:
+                normal[u, v] += jx * kx
+                normal[u, v + 1] += jx * ky
+                normal[u + 1, v] += jy * kx
+                normal[u + 1, v + 1] += jy * ky
+            else:
+                normal[v, u] += kx * jx
+                normal[v, u + 1] += kx * jy
+                normal[v + 1, u] += ky * jx
+                normal[v + 1, u + 1] += ky * jy
+
+
+@kernel
+def _cell_jacobian(
+    points: FloatArray, edges: IntArray, size: int, cell: int, work: Workspace, vertices: IntArray, rows: FloatArray
+) -> int:
+    """List the vertices that move the coverage of one cell, with d coverage / d (x, y); return how many they are."""
+    m = 0
+    piece = int(work.cells[cell, HEAD]) - 1
+    while piece >= 0:
+        edge = int(work.pieces[piece, EDGE])
+        i, j = edges[edge, 0], edges[edge, 1]
+        normal_x = (points[j, 1] - points[i, 1]) * size
+        normal_y = (points[i, 0] - points[j, 0]) * size
+        for vertex, weight in ((i, work.pieces[piece, START]), (j, work.pieces[piece, END])):
+            at = 0
+            while at < m and vertices[at] != vertex:
+                at += 1
+            if at == m:
+                vertices[m] = vertex
+                rows[m, 0] = 0.0
+                rows[m, 1] = 0.0
+                m += 1
+            rows[at, 0] += weight * normal_x
+            rows[at, 1] += weight * normal_y
+        piece = int(work.pieces[piece, NEXT]) - 1
+    return m
+
+
+@kernel
+def vector_jacobian(
+    points: FloatArray, edges: IntArray, size: int, cotangent: FloatArray, work: Workspace, gradient: FloatArray
+) -> None:
+    """Write sum over pixels of cotangent (R, R) * d coverage / d position (unit square) into `gradient` (V, 2)."""
+    walk_boundary(points, edges, size, work)
+    words = (size + 63) >> 6
+    gradient[:] = 0.0
+    for row in range(size):
+        for word in range(words):
+            bits = work.touched[row * words + word]
+            work.touched[row * words + word] = 0
+            while bits != 0:
+                column = word * 64 + int(trailing_zeros(bits))
+                bits &= bits - np.uint64(1)
+                cell = row * (size + PADDING) + column
+                _pull(points, edges, size, cell, cotangent[row, column] * size, work, gradient)
+                clear(cell, work)
+
+
+@kernel
+def losses_and_gradients(
+    points: FloatArray, edges: IntArray, point_starts: IntArray, edge_starts: IntArray, first: int, last: int,
+    coverage: FloatArray, row_sum: FloatArray, row_square_sum: FloatArray, work: Workspace,
+    losses: FloatArray, gradients: FloatArray,
+) -> None:  # fmt: skip
+    """`loss_and_gradient` of meshes first..last of a batch, all against one target."""
+    size = coverage.shape[0]
+    for k in range(first, last):
+        losses[k] = loss_and_gradient(
+            points[point_starts[k] : point_starts[k + 1]],
+            edges[edge_starts[k] : edge_starts[k + 1]],
+            size,
+            coverage,
+            row_sum,
+            row_square_sum,
+            work,
+            gradients[point_starts[k] : point_starts[k + 1]],
+        )
+
+
+@kernel
+def vector_jacobians(
+    points: FloatArray, edges: IntArray, point_starts: IntArray, edge_starts: IntArray, first: int, last: int,
+    cotangents: FloatArray, work: Workspace, gradients: FloatArray,
+) -> None:  # fmt: skip
+    """`vector_jacobian` of meshes first..last of a batch, each with its own cotangent image."""
+    for k in range(first, last):
+        vector_jacobian(
+            points[point_starts[k] : point_starts[k + 1]],
+            edges[edge_starts[k] : edge_starts[k + 1]],
+            cotangents.shape[1],
+            cotangents[k],
+            work,
+            gradients[point_starts[k] : point_starts[k + 1]],
+        )
