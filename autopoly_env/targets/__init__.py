@@ -1,0 +1,52 @@
+"""Where targets come from: the paper's random constructions, drawings of made-up things, folders of images.
+
+A source gives a `Silhouette` for every seed, the same one each time:
+
+>>> make_targets("construction", difficulty=3).sample(split_seed("test", 0)).name
+'construction_2147483648'
+"""
+
+import inspect
+import os
+from typing import Any
+
+from autopoly_env.errors import ConfigError
+from autopoly_env.targets.construction import ConstructionTargets
+from autopoly_env.targets.folder import FolderTargets
+from autopoly_env.targets.objects import ObjectTargets
+from autopoly_env.targets.source import SPLITS, TargetSource, split_seed
+
+__all__ = [
+    "SPLITS",
+    "ConstructionTargets",
+    "FolderTargets",
+    "ObjectTargets",
+    "TargetSource",
+    "make_targets",
+    "split_seed",
+]
+
+_KINDS: dict[str, type[ConstructionTargets] | type[ObjectTargets]] = {
+    "construction": ConstructionTargets,
+    "objects": ObjectTargets,
+}
+
+
+def make_targets(name_or_folder: str | os.PathLike[str], **options: Any) -> TargetSource:
+    """The source "construction" or "objects" with its options, or else the images of a folder (no options).
+
+    Raises ConfigError for another name, or for an option that the source does not have or allow; SilhouetteError
+    for a folder without images.
+    """
+    name = os.fspath(name_or_folder)
+    if name not in _KINDS:
+        if not os.path.isdir(name):
+            raise ConfigError(f"targets {name!r}: expected {', '.join(_KINDS)} or the path of a folder of images")
+        if options:
+            raise ConfigError(f"targets {name!r}: a folder of images has no options; leave out {', '.join(options)}")
+        return FolderTargets(name)
+    allowed = inspect.signature(_KINDS[name]).parameters
+    unknown = [option for option in options if option not in allowed]
+    if unknown:
+        raise ConfigError(f"targets {name!r} have no option {unknown[0]!r}; give one of {', '.join(allowed)}")
+    return _KINDS[name](**options)
