@@ -15,12 +15,15 @@ class BeamConfig:
     """How `beam` searches; `greedy` is a beam of width 1."""
 
     width: int = 8
-    patience: int = 3  # steps in a row that may fail to improve the best score
+    patience: int = 4  # steps in a row that may fail to improve the best score
+    stuck_discount: float = 0.5  # share of the price of complexity that ranking waives while nothing has improved
     merge_grid: float = 1 / 128  # shapes that agree to this length (unit square) count as one
 
     def __post_init__(self) -> None:
         if self.width < 1 or self.patience < 1 or not self.merge_grid > 0.0:
             raise ConfigError(f"{self}: expected a width and a patience of at least 1 and a positive merge_grid")
+        if not 0.0 <= self.stuck_discount <= 1.0:
+            raise ConfigError(f"stuck_discount = {self.stuck_discount}: expected a share, 0 to 1")
 
 
 class BeamAgent(Agent):
@@ -44,19 +47,27 @@ class BeamAgent(Agent):
         while kept and failures < self._config.patience and not meter.spent():
             tracks = []
             for parent in kept:
+                if meter.spent():
+                    break
                 children = [Track(child, parent) for child in simulator.transition_all(parent.state)]
                 yield from children
                 meter.add([child.state for child in children])
                 tracks += children
-            kept = self._select(tracks)
+            waived = simulator.weights.w_sc * self._config.stuck_discount if failures else 0.0
+            kept = self._select(tracks, waived)
             failures += 1
-            if kept and kept[0].state.score.total > best_total:
-                best_total, failures = kept[0].state.score.total, 0
+            top = max((track.state.score.total for track in kept), default=best_total)
+            if top > best_total:
+                best_total, failures = top, 0
 
-    def _select(self, tracks: Iterable[Track]) -> list[Track]:
-        """The `width` best of them, best first, no shape twice."""
+    def _select(self, tracks: Iterable[Track], waived: float) -> list[Track]:
+        """The `width` best of them, best first, no shape twice; complexity counts `waived` less than in the score."""
+
+        def rank(track: Track) -> float:
+            return -track.state.score.total - waived * track.state.score.complexity
+
         chosen: dict[str, Track] = {}
-        for track in sorted(tracks, key=lambda track: -track.state.score.total):
+        for track in sorted(tracks, key=rank):
             chosen.setdefault(canonical_hash(track.state.mesh, self._config.merge_grid), track)
             if len(chosen) == self._config.width:
                 break

@@ -22,11 +22,9 @@ from autopoly_env.actions import STOP, Action
 from autopoly_env.arrays import FloatArray
 from autopoly_env.parallel import map_threads
 from autopoly_env.placement import Disagreement, hole_shapes, starts
-from autopoly_env.refit import RefitConfig, RefitTarget
+from autopoly_env.refit import LOCAL, THOROUGH, RefitConfig, RefitTarget
 from autopoly_env.simulator import Simulator, State
 
-_QUICK = RefitConfig(first_level=2)
-_THOROUGH = RefitConfig(first_level=1, n_far=60)
 _NEW_RING_SIZES = (3, 4, 5, 6, 8)
 
 
@@ -100,14 +98,14 @@ class ClimbAgent(Agent):
             if meter.spent():
                 break
             neighbours = [o for o in self._neighbours(simulator, best, hill) if hill.reach.allows(o)]
-            fits = hill.fit(neighbours, _QUICK)
+            fits = hill.fit(neighbours, LOCAL)
             order = sorted(range(len(fits)), key=lambda k: -fits[k][0])
             n_fits = len(fits)
             if not fits or fits[order[0]][0] <= best_total + 1e-9:
                 hopeful = [neighbours[k] for k in order[: self._config.n_thorough]]
-                fits = hill.fit([*hopeful, best], _THOROUGH)
+                fits = hill.fit([*hopeful, best], THOROUGH)
                 relocations = [o for o in self._relocations(simulator, best) if hill.reach.allows(o)]
-                fits += hill.fit(relocations, _QUICK)
+                fits += hill.fit(relocations, LOCAL)
                 order = sorted(range(len(fits)), key=lambda k: -fits[k][0])
                 n_fits += len(fits)
             improved = fits[order[0]][0] > best_total + 1e-9
@@ -171,7 +169,7 @@ class _Hill:
 def polish(simulator: Simulator, outline: Outline) -> Outline:
     """The outline refitted at the silhouette's own resolution, if that scores better there."""
     target = RefitTarget.of(simulator.silhouette, min(512, simulator.silhouette.resolution))
-    fitted = outline.refitted(target, _QUICK)
+    fitted = outline.refitted(target, LOCAL)
     return max((outline, fitted), key=lambda candidate: final_total(simulator, candidate))
 
 

@@ -11,7 +11,7 @@ import typer
 
 from autopoly_env.errors import AutoPolyError, ConfigError
 
-DEFAULT_AGENT = "trace"
+DEFAULT_AGENT = "climb"
 USAGE_ERROR, FAILURE = 2, 1
 
 HELP = """Build a polygon mesh of every silhouette and tell how, action by action.

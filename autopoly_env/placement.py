@@ -124,10 +124,10 @@ def starts(disagreement: Disagreement, action: Action) -> list[Start]:
 
 
 def _pull_vertex(disagreement: Disagreement, plain: PolyMesh, row: int) -> Iterator[PolyMesh]:
-    """The new vertex at the far end of the larger region that the edge answers for."""
-    entry = max(disagreement.blame[row], key=lambda side: float(side[MASS]))
-    if entry[MASS] > 0.0:
-        yield from _sane_move(disagreement, plain, entry[[FAR_X, FAR_Y]][None])
+    """The new vertex at the far end of what is missing beside the edge and of what is too much, the larger first."""
+    for entry in sorted(disagreement.blame[row], key=lambda side: -float(side[MASS])):
+        if entry[MASS] > 0.0:
+            yield from _sane_move(disagreement, plain, entry[[FAR_X, FAR_Y]][None])
 
 
 def _stretch_quad(disagreement: Disagreement, plain: PolyMesh, row: int) -> Iterator[PolyMesh]:

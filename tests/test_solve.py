@@ -107,7 +107,7 @@ def test_solve__records_a_sequence_that_replays_to_the_mesh(run: Run) -> None:
     mesh = sequence.final()
     assert len(sequence.steps) == record["actions"] > 0
     assert sequence.settings == record["settings"]
-    assert (sequence.settings["agent"], sequence.settings["seed"]) == ("trace", 7)
+    assert (sequence.settings["agent"], sequence.settings["seed"]) == ("climb", 7)
     assert np.allclose(read_obj(record["files"]["mesh.obj"])[0], mesh.vertices)
     target = load_silhouette(EXAMPLES / "mug.png").target(512)
     assert score(mesh, target, ScoreWeights()).total == record["r_all"] == sequence.steps[-1].score["total"]
@@ -213,8 +213,8 @@ def test_max_steps_and_refits__limit_the_work(run: Run) -> None:
         (["box.png", "--refits", "-1"], "a budget of -1 refits"),
         (["box.png", "--max-steps", "-1"], "max_steps -1"),
         (["box.png", "--option", "width"], "expected key=value"),
-        (["box.png", "--option", "name=3"], "agent 'trace' has no option 'name'"),
-        (["box.png", "--option", "width=3"], "agent 'trace' has no option 'width'"),
+        (["box.png", "--option", "name=3"], "agent 'climb' has no option 'name'"),
+        (["box.png", "--option", "width=3"], "agent 'climb' has no option 'width'"),
         (["box.png", "--agent", "beam", "--option", "width=wide"], "option width"),
         (["box.png", "--agent", "beam", "--option", "width=0"], "width"),
         (["box/steps.png", "box.png", "--out", "."], "would overwrite the image box/steps.png"),
