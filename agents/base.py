@@ -75,6 +75,11 @@ class Meter:
         self._best_total = float("-inf")
         self.stopped_by = "finished"
 
+    @classmethod
+    def unlimited(cls) -> "Meter":
+        """A meter that never says stop."""
+        return cls(Budget())
+
     def add(self, states: Sequence[State]) -> None:
         """Note the states that one step of work produced."""
         best = max((state.score.total for state in states), default=float("-inf"))

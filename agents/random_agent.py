@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from agents.base import Agent, Decision
-from autopoly_env.actions import Action
+from autopoly_env.actions import STOP, Action
+from autopoly_env.errors import ConfigError
 from autopoly_env.simulator import Simulator, State
 
 
@@ -16,6 +17,10 @@ class RandomConfig:
     seed: int = 0
     n_steps: int = 20  # after which it stops
 
+    def __post_init__(self) -> None:
+        if self.seed < 0:
+            raise ConfigError(f"seed {self.seed}: expected at least 0")
+
 
 class RandomAgent(Agent):
     """Draws an operator, then one of its legal elements, so that operators with many elements are not favoured."""
@@ -24,16 +29,16 @@ class RandomAgent(Agent):
 
     def __init__(self, config: RandomConfig) -> None:
         self._config = config
-        self._rng = np.random.default_rng(config.seed)
 
     def act(self, simulator: Simulator, state: State) -> Decision:
-        stop, *legal = simulator.legal_actions(state)
+        legal = simulator.legal_actions(state)[1:]
         if not legal or state.step >= self._config.n_steps:
-            return Decision(stop)
+            return Decision(STOP)
+        rng = np.random.default_rng((self._config.seed, state.step))  # whatever was solved before
         by_operator: dict[str, list[Action]] = {}
         for action in legal:
             by_operator.setdefault(action.operator, []).append(action)
-        chosen = by_operator[sorted(by_operator)[self._rng.integers(len(by_operator))]]
+        chosen = by_operator[sorted(by_operator)[rng.integers(len(by_operator))]]
         share = 1.0 / len(by_operator)
         policy = {a: share / len(group) for group in by_operator.values() for a in group}
-        return Decision(chosen[self._rng.integers(len(chosen))], policy)
+        return Decision(chosen[rng.integers(len(chosen))], policy)

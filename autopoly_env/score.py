@@ -73,6 +73,7 @@ def self_intersections(mesh: PolyMesh) -> int:
 
 def _robust_count(ends: np.ndarray, edges: IntArray) -> int:
     apart = [(i, j) for i, j in combinations(range(len(edges)), 2) if not set(edges[i]) & set(edges[j])]
-    lines = shapely.linestrings(ends)
+    is_point = (ends[:, 0] == ends[:, 1]).all(axis=1)  # shapely's lines without length meet nothing
+    lines = np.where(is_point, shapely.points(ends[:, 0]), shapely.linestrings(ends))
     first, second = np.array(apart).T
     return int(shapely.intersects(lines[first], lines[second]).sum())

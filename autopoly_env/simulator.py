@@ -6,23 +6,24 @@ refit to the target finds. States are immutable values; a simulator draws no ran
 
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 import shapely
 
 from autopoly_env.actions import STOP, Action, legal_actions
+from autopoly_env.edits import Choice
 from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.edits import Choice
 from autopoly_env.operators import preset
 from autopoly_env.parallel import map_threads
 from autopoly_env.placement import Disagreement, Start, leaves_outline_alone, starts
-from autopoly_env.refit import FROM_AFAR, RefitConfig, RefitTarget, refit
+from autopoly_env.refit import FROM_AFAR, LOCAL, THOROUGH, RefitConfig, RefitResult, RefitTarget, refit
+from autopoly_env.routines import Routine, run
 from autopoly_env.score import Score, ScoreWeights, score
 from autopoly_env.silhouette import Silhouette
 
-TRANSITION_REFIT = RefitConfig(first_level=1, n_far=60)
 POLISH_RESOLUTION = 512  # of the finest refit; a score may be finer
 
 
@@ -88,10 +89,14 @@ class Simulator:
 
         The rectangles are the upright and the smallest bounding box of the target.
         """
+        return run(self.initial_routine(mesh))
+
+    def initial_routine(self, mesh: PolyMesh | None = None) -> Routine[State]:
+        """`initial` as a routine, whose job is the refits."""
         if mesh is not None:
             return self._ended(State(mesh, self.score(mesh), n_refits=0))
-        fits = [refit(box, self._refit_target, FROM_AFAR).mesh for box in self._bounding_boxes()]
-        best = max(fits, key=lambda fit: self.score(fit).total)
+        fits = yield partial(self._fits, list(self._bounding_boxes()), FROM_AFAR)
+        best = max((fit.mesh for fit in fits), key=lambda fit: self.score(fit).total)
         return self._ended(State(best, self.score(best), n_refits=len(fits)))
 
     def _bounding_boxes(self) -> Iterator[PolyMesh]:
@@ -99,7 +104,8 @@ class Simulator:
         x0, x1 = columns.min() / self.resolution, (columns.max() + 1) / self.resolution
         y0, y1 = rows.min() / self.resolution, (rows.max() + 1) / self.resolution
         yield PolyMesh.rectangle(x0, y0, x1, y1)
-        centres = np.column_stack((columns, rows)) + 0.5
+        at_row_end = (np.diff(rows, prepend=-1) != 0) | (np.diff(rows, append=-1) != 0)  # these have the same hull
+        centres = np.column_stack((columns, rows))[at_row_end] + 0.5
         around = shapely.MultiPoint(centres / self.resolution).minimum_rotated_rectangle
         if isinstance(around, shapely.Polygon):
             corners = np.clip(shapely.get_coordinates(around.normalize())[:4], 0.0, 1.0)
@@ -121,6 +127,10 @@ class Simulator:
 
     def transition(self, state: State, action: Action) -> State:
         """The state after one action and its refit. Raises IllegalActionError where the action is not legal."""
+        return run(self.transition_routine(state, action))
+
+    def transition_routine(self, state: State, action: Action) -> Routine[State]:
+        """`transition` as a routine, whose job is the refits."""
         if state.done:
             raise IllegalActionError(f"the construction has ended ({state.done}): start from an earlier state")
         if action == STOP:
@@ -128,7 +138,11 @@ class Simulator:
         if action.operator not in self.operators:
             raise IllegalActionError(f"{action.operator!r} is not one of this simulator's operators: {self.operators}")
         begin = starts(Disagreement(state.mesh, self.silhouette), action)
-        return self._refitted(state, action, begin)
+        return (yield from self._refitted(state, action, begin))
+
+    def idle(self, state: State) -> State:
+        """The state one step later, nothing done: what a player that asks for an illegal action gets."""
+        return self._ended(replace(state, step=state.step + 1, action=None, choice=None, n_refits=0))
 
     def transition_all(self, state: State, actions: Sequence[Action] | None = None) -> list[State]:
         """`transition` of all (or the given) actions but STOP, on all cores, in their order.
@@ -140,19 +154,22 @@ class Simulator:
         chosen = legal_actions(state.mesh, self.operators) if actions is None else actions
         disagreement = Disagreement(state.mesh, self.silhouette)
         jobs = _possible_starts(disagreement, [action for action in chosen if action != STOP])
-        return map_threads(lambda job: self._refitted(state, *job), jobs)
+        return map_threads(lambda job: run(self._refitted(state, *job)), jobs)
 
-    def _refitted(self, state: State, action: Action, begin: list[Start]) -> State:
+    def _refitted(self, state: State, action: Action, begin: list[Start]) -> Routine[State]:
         """The best of the refits from the given starts."""
         if leaves_outline_alone(state.mesh, action):
             choice, mesh = begin[0]
             n_refits = 0
         else:
-            fits = [(choice, refit(mesh, self._refit_target, TRANSITION_REFIT)) for choice, mesh in begin]
-            choice, best = min(fits, key=lambda fit: fit[1].loss)
-            mesh, n_refits = best.mesh, len(fits)
+            fits = yield partial(self._fits, [mesh for _, mesh in begin], THOROUGH)
+            k = min(range(len(fits)), key=lambda k: fits[k].loss)
+            choice, mesh, n_refits = begin[k][0], fits[k].mesh, len(fits)
         after = State(mesh, self.score(mesh), state.step + 1, "", action, choice, n_refits)
         return self._ended(after)
+
+    def _fits(self, meshes: list[PolyMesh], config: RefitConfig) -> list[RefitResult]:
+        return [refit(mesh, self._refit_target, config) for mesh in meshes]
 
     def _ended(self, state: State) -> State:
         """The state with its end marked, if this is one."""
@@ -165,13 +182,11 @@ class Simulator:
     def polish(self, mesh: PolyMesh) -> PolyMesh:
         """The mesh refitted at the silhouette's own resolution (at most `POLISH_RESOLUTION`), if that scores better."""
         size = min(self.silhouette.resolution, POLISH_RESOLUTION)
-        fitted = refit(mesh, RefitTarget.of(self.silhouette, size), RefitConfig(first_level=2)).mesh
+        fitted = refit(mesh, RefitTarget.of(self.silhouette, size), LOCAL).mesh
         return max((mesh, fitted), key=lambda candidate: self.final_score(candidate).total)
 
 
-def _possible_starts(
-    disagreement: Disagreement, actions: Sequence[Action]
-) -> Iterator[tuple[Action, list[Start]]]:
+def _possible_starts(disagreement: Disagreement, actions: Sequence[Action]) -> Iterator[tuple[Action, list[Start]]]:
     for action in actions:
         try:
             yield action, starts(disagreement, action)

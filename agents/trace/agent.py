@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from itertools import chain, count
 
 import numpy as np
+import shapely
 
 from agents.base import Agent, Budget, Decision, Meter, Progress, Solution, finish
 from agents.trace.construct import UnbuildableError, construct
@@ -18,11 +19,11 @@ from agents.trace.rings import Ring, signed_area, trace_rings
 from agents.trace.simplify import Contour
 from autopoly_env.actions import STOP
 from autopoly_env.errors import ConfigError
-from autopoly_env.refit import RefitConfig, RefitTarget
+from autopoly_env.refit import LOCAL, THOROUGH, RefitTarget
 from autopoly_env.score import ScoreWeights
 from autopoly_env.simulator import Simulator, State
 
-_REFITS = (RefitConfig(first_level=2), RefitConfig(first_level=1, n_far=60))
+_REFITS = (LOCAL, THOROUGH)
 _HIGHEST_PRICE = 1000.0
 
 
@@ -94,7 +95,7 @@ class TraceAgent(Agent):
             if price > prices[-1] and (found or price > _HIGHEST_PRICE):
                 return
             weights = ScoreWeights(simulator.weights.w_sm, simulator.weights.w_sc * price)
-            sizes = tuple(choose_sizes(rings, contours, weights, area, reach))
+            sizes = _without_hidden(rings, list(choose_sizes(rings, contours, weights, area, reach)))
             if sizes not in seen:
                 seen.add(sizes)
                 outline = _outline(rings, contours, sizes)
@@ -122,6 +123,18 @@ def choose_sizes(
             continue
         kept.add(k)
         yield sizes[int(np.argmin(costs))]
+
+
+def _without_hidden(rings: Sequence[Ring], sizes: Sequence[int]) -> tuple[int, ...]:
+    """The sizes, but 0 for parts inside a hole that is left out, since they would not show, and for holes in them."""
+    kept = np.flatnonzero(sizes).tolist()
+    polygons = np.array([shapely.Polygon(rings[k].points) for k in kept])
+    layers = np.array([-1 if rings[k].is_hole else 1 for k in kept])
+    outer = (k for k in kept if not rings[k].is_hole)
+    hidden = {k for k in outer if layers @ shapely.contains_xy(polygons, *rings[k].points[0]) > 0}
+    return tuple(
+        0 if {k, ring.parent} & hidden else size for k, (ring, size) in enumerate(zip(rings, sizes, strict=True))
+    )
 
 
 def _outline(rings: Sequence[Ring], contours: Sequence[Contour], sizes: Sequence[int]) -> Outline:

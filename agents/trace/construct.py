@@ -129,17 +129,20 @@ def _begin_with_triangle(simulator: Simulator, points: FloatArray) -> _Builder:
 
 
 def _cut_holes(builder: _Builder, holes: Sequence[FloatArray]) -> None:
-    """Cut the holes that can be cut, the largest first."""
+    """Cut the holes that can be cut, the largest first; try the others again with what has been cut to tie them to."""
     if "face_hole" not in builder.simulator.operators:
         return
-    remaining = [hole[::-1] for hole in holes]  # wound as faces
-    while remaining:
-        hole, *remaining = remaining
-        kept = len(builder.states)
-        try:
-            _cut_hole(builder, hole, remaining)
-        except UnbuildableError:
-            del builder.states[kept:]
+    waiting, n_before = [hole[::-1] for hole in holes], len(holes) + 1  # wound as faces
+    while len(waiting) < n_before:
+        failed = []
+        for k, hole in enumerate(waiting):
+            kept = len(builder.states)
+            try:
+                _cut_hole(builder, hole, waiting[k + 1 :])
+            except UnbuildableError:
+                del builder.states[kept:]
+                failed.append(hole)
+        waiting, n_before = failed, len(waiting)
 
 
 def _cut_hole(builder: _Builder, hole: FloatArray, others: Sequence[FloatArray]) -> None:
