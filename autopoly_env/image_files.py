@@ -35,9 +35,7 @@ def _expanded(path: str) -> list[Path]:
         return images
     images = _only_images(glob.iglob(path, recursive=True))
     if not images:
-        raise SilhouetteError(
-            f"{path!r} matches no image; expected a file, a directory or a pattern: check the path"
-        )
+        raise SilhouetteError(f"{path!r} matches no image; expected a file, a directory or a pattern: check the path")
     return images
 
 

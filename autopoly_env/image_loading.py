@@ -75,9 +75,7 @@ def read_picture(source: ImageSource) -> Picture:
         name = Path(given_name).stem if isinstance(given_name, str) else "silhouette"
         return _read_stream(source, name, "the given file object")
     kind = type(source).__name__
-    raise SilhouetteError(
-        f"cannot load a {kind}; expected a path, a binary file object, a PIL image or a numpy array"
-    )
+    raise SilhouetteError(f"cannot load a {kind}; expected a path, a binary file object, a PIL image or a numpy array")
 
 
 def _read_path(path: Path) -> Picture:
@@ -89,9 +87,7 @@ def _read_path(path: Path) -> Picture:
     except FileNotFoundError:
         raise SilhouetteError(f"{label} does not exist; expected an image file: check the path") from None
     except (OSError, ValueError) as error:
-        raise SilhouetteError(
-            f"{label} cannot be opened ({_reason(error)}); expected a readable image file"
-        ) from error
+        raise SilhouetteError(f"{label} cannot be opened ({_reason(error)}); expected a readable image file") from error
     with stream:
         return _read_stream(stream, path.stem, label)
 
@@ -142,13 +138,9 @@ def _read_array(array: npt.NDArray[Any]) -> Picture:
         raise _without_pixels(label, f"{width}x{height}")
     is_mask = array.dtype == np.bool_
     if is_mask and array.size != width * height:
-        raise SilhouetteError(
-            f"{label} is no mask; expected one channel: combine them, e.g. array.any(axis=2)"
-        )
+        raise SilhouetteError(f"{label} is no mask; expected one channel: combine them, e.g. array.any(axis=2)")
     if not (is_mask or array.dtype == np.uint8 or np.issubdtype(array.dtype, np.floating)):
-        raise SilhouetteError(
-            f"{label} has no known range; expected bool, uint8 or float in 0..1: convert it"
-        )
+        raise SilhouetteError(f"{label} has no known range; expected bool, uint8 or float in 0..1: convert it")
     if np.issubdtype(array.dtype, np.floating):
         low, high = float(array.min()), float(array.max())
         if not np.isfinite(high - low):
@@ -185,16 +177,12 @@ def _pillow_levels(image: Image.Image, top: int, end: int) -> FloatArray:
     return np.stack([np.asarray(band, dtype=np.float32) for band in bands]) / np.float32(255)
 
 
-def _reduced(
-    levels_of_rows: Callable[[int, int], FloatArray], width: int, height: int
-) -> tuple[FloatArray, list[str]]:
+def _reduced(levels_of_rows: Callable[[int, int], FloatArray], width: int, height: int) -> tuple[FloatArray, list[str]]:
     """Read strip by strip and average blocks of factor x factor pixels: (C, H, W) with sides <= MAX_SIDE,
     notes."""
     factor = -(-max(width, height) // MAX_SIDE)
     rows = factor * max(1, STRIP_PIXELS // (width * factor))
-    strips = [
-        _block_means(levels_of_rows(top, min(top + rows, height)), factor) for top in range(0, height, rows)
-    ]
+    strips = [_block_means(levels_of_rows(top, min(top + rows, height)), factor) for top in range(0, height, rows)]
     levels = np.concatenate(strips, axis=1)
     if factor == 1:
         return levels, []

@@ -63,9 +63,7 @@ def _split_by_grey(grey: FloatArray) -> tuple[BoolArray, list[str]]:
     ]
     unclear = _unclear_share(grey, light)
     if unclear > MAX_UNCLEAR:
-        notes.append(
-            f"warning: more than two clear levels ({unclear:.0%} of the pixels fit neither): is it a photo?"
-        )
+        notes.append(f"warning: more than two clear levels ({unclear:.0%} of the pixels fit neither): is it a photo?")
     return light != background_is_light, notes
 
 

@@ -35,7 +35,7 @@ def workspace(resolution: int, n_edges: int) -> Workspace:
         cells, pieces = max(cells, len(held.cells)), max(pieces, len(held.pieces))
     words = cells // 64 + int(np.sqrt(cells)) + 1  # a last word for each row
     _local.workspace = Workspace(np.zeros((cells, 4)), np.zeros(words, np.uint64), np.zeros((pieces, 4)))
-    return _local.workspace  # type: ignore[no-any-return]
+    return _local.workspace
 
 
 def _check_resolution(resolution: int) -> None:

@@ -84,9 +84,7 @@ class Silhouette:
             given = f"the mask has shape {mask.shape} and dtype {mask.dtype}"
             raise SilhouetteError(f"{given}; expected (R, R) and bool: use load_silhouette for other images")
         if not mask.any():
-            raise SilhouetteError(
-                "the mask is False everywhere: there is no object; expected some True pixels"
-            )
+            raise SilhouetteError("the mask is False everywhere: there is no object; expected some True pixels")
         object.__setattr__(self, "mask", _read_only(mask))
 
     @property
@@ -115,9 +113,7 @@ class Silhouette:
         return Silhouette, (self.mask, self.name, self.notes)  # without the targets: cheaper made than sent
 
 
-def load_silhouette(
-    source: ImageSource, *, name: str | None = None, min_component: int | None = None
-) -> Silhouette:
+def load_silhouette(source: ImageSource, *, name: str | None = None, min_component: int | None = None) -> Silhouette:
     """Load an image and find the object in it.
 
     `source` is a path, a binary file object, a PIL image or an array: (H, W) or (H, W, 1 to 4), uint8 or
@@ -134,9 +130,7 @@ def load_silhouette(
     Silhouette(name='diagonal', notes=('object touches the border of the image',))
     """
     if min_component is not None and min_component < 0:
-        raise ConfigError(
-            f"min_component is {min_component}; expected pixels, 0 or more: 0 keeps every speck"
-        )
+        raise ConfigError(f"min_component is {min_component}; expected pixels, 0 or more: 0 keeps every speck")
     picture = read_picture(source)
     mask, how_found = object_mask.find_object(picture)
     mask, how_cleaned = object_mask.clean(mask, min_component)
