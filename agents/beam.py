@@ -7,6 +7,7 @@ from agents.base import Agent, Decision, Meter, Track
 from autopoly_env.actions import STOP
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import canonical_hash
+from autopoly_env.placement import is_sane
 from autopoly_env.simulator import Simulator, State
 
 
@@ -49,9 +50,10 @@ class BeamAgent(Agent):
             for parent in kept:
                 if meter.spent():
                     break
-                children = [Track(child, parent) for child in simulator.transition_all(parent.state)]
+                states = simulator.transition_all(parent.state)
+                children = [Track(state, parent) for state in states if is_sane(state.mesh)]
                 yield from children
-                meter.add([child.state for child in children])
+                meter.add(states)
                 tracks += children
             waived = simulator.weights.w_sc * self._config.stuck_discount if failures else 0.0
             kept = self._select(tracks, waived)

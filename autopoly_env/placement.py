@@ -14,10 +14,10 @@ import shapely
 from autopoly_env import placement_kernels
 from autopoly_env.actions import Action
 from autopoly_env.arrays import FloatArray
+from autopoly_env.edits import HOLE_SIDES, Choice
 from autopoly_env.errors import IllegalActionError
 from autopoly_env.holes import HoleChoice, plan_hole
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.edits import HOLE_SIDES, Choice
 from autopoly_env.operators import OPERATORS, n_elements
 from autopoly_env.placement_kernels import (
     AREA,
@@ -98,6 +98,11 @@ def defects_of(mesh: PolyMesh) -> tuple[int, int]:
     """(crossings, flipped or empty faces) as the refit counts them."""
     crossings, flipped = defects(mesh.vertices, shape_of(mesh.topology))
     return int(crossings), int(flipped)
+
+
+def is_sane(mesh: PolyMesh) -> bool:
+    """Whether no edges cross and no face is flipped or empty."""
+    return defects_of(mesh) == (0, 0)
 
 
 def starts(disagreement: Disagreement, action: Action) -> list[Start]:

@@ -18,9 +18,9 @@ from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import preset
 from autopoly_env.parallel import map_threads
-from autopoly_env.placement import Disagreement, Start, leaves_outline_alone, starts
-from autopoly_env.refit import FROM_AFAR, LOCAL, THOROUGH, RefitConfig, RefitResult, RefitTarget, refit
-from autopoly_env.routines import Routine, run
+from autopoly_env.placement import Disagreement, Start, defects_of, leaves_outline_alone, starts
+from autopoly_env.refit import FROM_AFAR, LOCAL, THOROUGH, RefitConfig, RefitTarget, refit
+from autopoly_env.routines import Job, Routine, run
 from autopoly_env.score import Score, ScoreWeights, score
 from autopoly_env.silhouette import Silhouette
 
@@ -92,10 +92,10 @@ class Simulator:
         return run(self.initial_routine(mesh))
 
     def initial_routine(self, mesh: PolyMesh | None = None) -> Routine[State]:
-        """`initial` as a routine, whose job is the refits."""
+        """`initial` as a routine, whose jobs are the refits."""
         if mesh is not None:
             return self._ended(State(mesh, self.score(mesh), n_refits=0))
-        fits = yield partial(self._fits, list(self._bounding_boxes()), FROM_AFAR)
+        fits = yield [self._refit_job(box, FROM_AFAR) for box in self._bounding_boxes()]
         best = max((fit.mesh for fit in fits), key=lambda fit: self.score(fit).total)
         return self._ended(State(best, self.score(best), n_refits=len(fits)))
 
@@ -130,13 +130,12 @@ class Simulator:
         return run(self.transition_routine(state, action))
 
     def transition_routine(self, state: State, action: Action) -> Routine[State]:
-        """`transition` as a routine, whose job is the refits."""
+        """`transition` as a routine, whose jobs are the refits."""
         if state.done:
             raise IllegalActionError(f"the construction has ended ({state.done}): start from an earlier state")
         if action == STOP:
             return replace(state, done="stop", action=STOP, choice=None, n_refits=0)
-        if action.operator not in self.operators:
-            raise IllegalActionError(f"{action.operator!r} is not one of this simulator's operators: {self.operators}")
+        self._check_operator(action)
         begin = starts(Disagreement(state.mesh, self.silhouette), action)
         return (yield from self._refitted(state, action, begin))
 
@@ -147,29 +146,37 @@ class Simulator:
     def transition_all(self, state: State, actions: Sequence[Action] | None = None) -> list[State]:
         """`transition` of all (or the given) actions but STOP, on all cores, in their order.
 
-        Actions that turn out to have no room, such as a hole that fits nowhere, are left out.
+        Actions that turn out to have no room, such as a hole that fits nowhere, are left out. Raises
+        IllegalActionError for operators that are not the simulator's.
         """
         if state.done:
             return []
         chosen = legal_actions(state.mesh, self.operators) if actions is None else actions
+        for action in chosen:
+            if action != STOP:
+                self._check_operator(action)
         disagreement = Disagreement(state.mesh, self.silhouette)
         jobs = _possible_starts(disagreement, [action for action in chosen if action != STOP])
         return map_threads(lambda job: run(self._refitted(state, *job)), jobs)
 
+    def _check_operator(self, action: Action) -> None:
+        if action.operator not in self.operators:
+            raise IllegalActionError(f"{action.operator!r} is not one of this simulator's operators: {self.operators}")
+
     def _refitted(self, state: State, action: Action, begin: list[Start]) -> Routine[State]:
-        """The best of the refits from the given starts."""
+        """The refit with the fewest crossings and flipped faces, and of those the best, from the given starts."""
         if leaves_outline_alone(state.mesh, action):
             choice, mesh = begin[0]
             n_refits = 0
         else:
-            fits = yield partial(self._fits, [mesh for _, mesh in begin], THOROUGH)
+            fits = yield [self._refit_job(mesh, THOROUGH) for _, mesh in begin]
             k = min(range(len(fits)), key=lambda k: fits[k].loss)
             choice, mesh, n_refits = begin[k][0], fits[k].mesh, len(fits)
         after = State(mesh, self.score(mesh), state.step + 1, "", action, choice, n_refits)
         return self._ended(after)
 
-    def _fits(self, meshes: list[PolyMesh], config: RefitConfig) -> list[RefitResult]:
-        return [refit(mesh, self._refit_target, config) for mesh in meshes]
+    def _refit_job(self, mesh: PolyMesh, config: RefitConfig) -> Job:
+        return partial(refit, mesh, self._refit_target, config)
 
     def _ended(self, state: State) -> State:
         """The state with its end marked, if this is one."""

@@ -19,7 +19,7 @@ from autopoly_env.errors import AutoPolyError, IllegalActionError
 from autopoly_env.holes import HoleChoice, plan_hole
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import OPERATORS
-from autopoly_env.placement import defects_of
+from autopoly_env.placement import is_sane
 from autopoly_env.simulator import Simulator, State
 
 _N_NATURAL_TRIES = 200  # ways to grow a further part out of the mesh that are tried before it is put in place at once
@@ -33,7 +33,7 @@ class _Builder:
     """The states of a construction in the making."""
 
     def __init__(self, simulator: Simulator, start: PolyMesh) -> None:
-        if defects_of(start) != (0, 0):
+        if not is_sane(start):
             raise UnbuildableError("the main outline crosses itself")
         self.simulator = simulator
         self.states = [State(start, simulator.score(start), n_refits=0)]
@@ -52,7 +52,7 @@ class _Builder:
         for vertex_id, position in moves.items():
             vertices[made.vertex_index(vertex_id)] = position
         moved = made.with_vertices(vertices)
-        return moved if defects_of(moved) == (0, 0) else None
+        return moved if is_sane(moved) else None
 
     def do(
         self, name: str, element: int, choice: Choice | None = None, moves: dict[int, FloatArray] | None = None
