@@ -27,3 +27,11 @@ class ConfigError(AutoPolyError):
 
 class OutputError(AutoPolyError):
     """A result that cannot be written where it was asked to go."""
+
+
+class EpisodeError(AutoPolyError):
+    """An environment used out of turn: before a reset, or after the episode's end."""
+
+
+class ConformanceError(AutoPolyError):
+    """A part that breaks one of the rules the others rely on."""

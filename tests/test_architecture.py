@@ -12,12 +12,14 @@ ROOT = Path(__file__).parent.parent
 ROOMS = ("autopoly_env", "agents", "training")
 SOURCES = sorted(path for room in ROOMS for path in (ROOT / room).rglob("*.py"))
 
+GYMNASIUM_SHELL = tuple(f"autopoly_env/{name}" for name in ("__init__", "env", "vector_env", "wrappers"))
+
 # (who is imported, where it may not be, except there): folders and files relative to the root, without ".py"
 LINES = [
     ("agents", ("autopoly_env",), ()),
     ("training", ("autopoly_env", "agents"), ()),
     ("torch", ("autopoly_env",), ("autopoly_env/torch_raster",)),
-    ("gymnasium", ROOMS, ("autopoly_env/__init__", "autopoly_env/env", "autopoly_env/wrappers", "agents/rl")),
+    ("gymnasium", ROOMS, (*GYMNASIUM_SHELL, "agents/rl")),
     ("stable_baselines3", ROOMS, ("agents/rl", "training/train_rl")),
     ("sb3_contrib", ROOMS, ("agents/rl", "training/train_rl")),
     ("ray", ROOMS, ("training/parallel",)),

@@ -12,7 +12,7 @@ from autopoly_env.arrays import ByteArray
 from autopoly_env.errors import ConfigError
 from autopoly_env.files import write_atomically
 
-N_COLOURS = 64  # the viewer's few colours and the shades between them at the edges
+N_COLOURS = 256  # as many as GIF has
 LAST_FRAME_SECONDS = 2.0
 
 
@@ -29,8 +29,7 @@ def save_gif(frames: Sequence[ByteArray], path: str | os.PathLike[str], *, fps: 
         raise ConfigError(f"frames of dtype {frames[0].dtype}: expected uint8, 0 to 255")
     if not 0.1 <= fps <= 50.0:
         raise ConfigError(f"{fps} frames a second: expected 0.1 to 50, which GIF can time")
-    palette = _palette(frames)
-    pictures = [Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
+    pictures = _pictures(frames)
     each = round(1000.0 / fps)
     durations = [each] * (len(pictures) - 1) + [max(each, round(1000.0 * LAST_FRAME_SECONDS))]
     stream = io.BytesIO()
@@ -38,7 +37,16 @@ def save_gif(frames: Sequence[ByteArray], path: str | os.PathLike[str], *, fps: 
     return write_atomically(path, stream.getvalue())
 
 
-def _palette(frames: Sequence[ByteArray]) -> Image.Image:
-    """One palette for all frames, so that what stays does not flicker."""
-    sample = [frames[k] for k in sorted({0, len(frames) // 2, len(frames) - 1})]
-    return Image.fromarray(np.concatenate(sample)).quantize(N_COLOURS, dither=Image.Dither.NONE)
+def _pictures(frames: Sequence[ByteArray]) -> list[Image.Image]:
+    """The frames in one palette: the colours that most of their pixels have, exactly; others become the nearest."""
+    pixels = np.stack(frames).astype(np.int64)
+    packed = pixels @ (1 << 16, 1 << 8, 1)
+    colours, where, counts = np.unique(packed, return_inverse=True, return_counts=True)
+    values = np.column_stack((colours >> 16, colours >> 8 & 255, colours & 255))
+    common = values[np.argsort(-counts, kind="stable")[:N_COLOURS]]
+    nearest = np.array([((common - value) ** 2).sum(axis=1).argmin() for value in values], np.uint8)
+    pictures = []
+    for numbers in nearest[where].reshape(packed.shape):
+        pictures.append(Image.fromarray(numbers))
+        pictures[-1].putpalette(common.astype(np.uint8).tobytes())
+    return pictures

@@ -1,0 +1,214 @@
+"""Checks for parts of your own: an operator, a simulator, a target source or an environment that others can rely on.
+
+Each check returns None, or raises ConformanceError naming the rule that was broken, and where. Example, in a test:
+
+>>> from autopoly_env.operators import OPERATORS
+>>> check_operator(OPERATORS["edge_subdivide"])
+"""
+
+import pickle
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+
+from autopoly_env.actions import STOP
+from autopoly_env.errors import AutoPolyError, ConfigError, ConformanceError, IllegalActionError
+from autopoly_env.mesh import PolyMesh, is_valid
+from autopoly_env.operators import OPERATORS, Operator, n_elements
+from autopoly_env.silhouette import Silhouette
+from autopoly_env.simulator import Simulator, State
+from autopoly_env.targets import TargetSource
+
+
+def check_operator(operator: Operator, meshes: Iterable[PolyMesh] | None = None) -> None:
+    """Check an operator on every element of some meshes (by default of a few with concave faces and holes).
+
+    Rules: the mask has one bool per element and says where `apply` works; elsewhere it raises IllegalActionError. The
+    mesh that comes out is valid; V - E + F is components - holes; (V, E, F) change by `changes` at most, an increase
+    exactly; ids are never reused and what survives keeps its id; the same input gives the same mesh and is not touched.
+    """
+    for mesh in sample_meshes() if meshes is None else meshes:
+        n, mask = n_elements(mesh, operator.element), operator.legal_mask(mesh)
+        _require(
+            mask.shape == (n,) and mask.dtype == np.bool_, f"{operator.name} on {mesh}: the mask must be ({n},) bool"
+        )
+        for element in (-1, *range(n), n):
+            where = f"{operator.name} on {operator.element} {element} of {mesh}"
+            legal = 0 <= element < n and bool(mask[element])
+            _check_edit(operator, mesh, element, legal, where)
+
+
+def check_simulator(simulator: Simulator, n_steps: int = 30, seed: int = 0) -> None:
+    """Check a simulator by playing `n_steps` random actions.
+
+    Rules: STOP is legal until the end, nothing after it; every action it calls legal works, another raises
+    IllegalActionError; the same state and action give the same state, alone and in `transition_all`; a transition
+    leaves the state it starts from as it was; scores are those of the meshes; states pickle; `max_steps` is kept.
+    """
+    rng = np.random.default_rng(seed)
+    state = simulator.initial()
+    _require(_same_state(state, simulator.initial()), "the initial state is not the same twice")
+    for step in range(n_steps):
+        if state.done:
+            state = simulator.initial()
+            if state.done:
+                return
+        legal = simulator.legal_actions(state)
+        _require(legal[:1] == [STOP], f"step {step}: STOP is not the first legal action")
+        _require(simulator.transition(state, STOP).done == "stop", f"step {step}: STOP does not end the game")
+        if len(legal) == 1:
+            return
+        state = _checked_transition(simulator, state, legal[rng.integers(1, len(legal))], f"step {step}")
+    ended = simulator.transition(state, STOP) if not state.done else state
+    _require(simulator.legal_actions(ended) == [], "something is legal after the end")
+    _require(
+        _raises(IllegalActionError, lambda: simulator.transition(ended, STOP)), "a step after the end is not refused"
+    )
+
+
+def check_target_source(source: TargetSource, n: int = 10) -> None:
+    """Check a source of targets with the seeds 0 to `n` - 1.
+
+    Rules: it has a name; every seed gives a `Silhouette`, the same each time and from a pickled copy; not all are alike
+    (unless there is but one seed); a negative seed raises ConfigError.
+    """
+    _require(isinstance(source.name, str) and bool(source.name), "a source of targets needs a name")
+    copy = pickle.loads(pickle.dumps(source))
+    seen = set()
+    for seed in range(n):
+        shape = source.sample(seed)
+        _require(isinstance(shape, Silhouette), f"seed {seed} gives {type(shape).__name__}: expected a Silhouette")
+        for other in (source.sample(seed), copy.sample(seed)):
+            same = other.name == shape.name and np.array_equal(other.mask, shape.mask)
+            _require(same, f"seed {seed} gives another target the second time")
+        seen.add(shape.mask.tobytes())
+    _require(len(seen) > 1 or n < 2, f"{n} seeds give one and the same target")
+    _require(_raises(ConfigError, lambda: source.sample(-1)), "seed -1 is not refused with a ConfigError")
+
+
+def check_env(env: Any, n_steps: int = 60, seed: int = 0) -> None:
+    """Check of an AutoPoly environment, wrapped or not, what Gymnasium's own `check_env` does not.
+
+    Rules: STOP is always legal; an action that the mask allows is never invalid, one that it forbids always is and
+    leaves the shape alone; infos have the same keys and types at every step; restoring a state and playing on gives
+    the same trace, bit for bit, and so does a copy of the state that was pickled.
+    """
+    rng = np.random.default_rng(seed)
+    _, info = env.reset(seed=seed)
+    start = env.unwrapped.clone_state()
+    actions, trace = [], []
+    for step in range(n_steps):
+        _require(info["action_mask"][0] == 1, f"step {step}: the mask forbids STOP")
+        choices = np.flatnonzero(info["action_mask"] == (step % 5 != 4))  # every fifth action is an illegal one
+        actions.append(int(rng.choice(choices[choices > 0])) if choices.any() else 0)
+        outcome = _checked_step(env, actions[-1], info, f"step {step}")
+        info = outcome[-1]
+        trace.append(_comparable(outcome))
+        if outcome[2] or outcome[3]:
+            break
+    for state in (start, pickle.loads(pickle.dumps(start))):
+        env.reset(options={"state": state})
+        for step, (action, expected) in enumerate(zip(actions, trace, strict=True)):
+            _require(_comparable(env.step(action)) == expected, f"step {step} is another one after a restore")
+
+
+def sample_meshes() -> list[PolyMesh]:
+    """A rectangle, a grid, one with a corner gone, an L, a ring, two squares that touch in a point, and two apart."""
+    ring = [(0.1, 0.1), (0.9, 0.1), (0.9, 0.9), (0.1, 0.9), (0.3, 0.3), (0.7, 0.3), (0.7, 0.7), (0.3, 0.7)]
+    bend = [(0.1, 0.1), (0.4, 0.1), (0.4, 0.6), (0.9, 0.6), (0.9, 0.9), (0.1, 0.9)]
+    corner = [(0.1, 0.1), (0.5, 0.1), (0.5, 0.5), (0.1, 0.5), (0.9, 0.5), (0.9, 0.9), (0.5, 0.9)]
+    pair = [(0.1, 0.1), (0.4, 0.1), (0.4, 0.4), (0.1, 0.4), (0.6, 0.6), (0.9, 0.6), (0.9, 0.9), (0.6, 0.9)]
+    return [
+        PolyMesh.rectangle(0.2, 0.3, 0.8, 0.7),
+        PolyMesh.grid(2, 0.1, 0.1, 0.9, 0.9),
+        OPERATORS["face_delete"].apply(PolyMesh.grid(2, 0.1, 0.1, 0.9, 0.9), 0),  # the id of a vertex is free
+        PolyMesh.from_faces(bend, [range(6)]),
+        PolyMesh.from_faces(ring, [(k, (k + 1) % 4, 4 + (k + 1) % 4, 4 + k) for k in range(4)]),
+        PolyMesh.from_faces(corner, [(0, 1, 2, 3), (2, 4, 5, 6)]),
+        PolyMesh.from_faces(pair, [(0, 1, 2, 3), (4, 5, 6, 7)]),
+    ]
+
+
+def _check_edit(operator: Operator, mesh: PolyMesh, element: int, legal: bool, where: str) -> None:
+    untouched = pickle.loads(pickle.dumps(mesh))
+    if not legal:
+        _require(
+            _raises(IllegalActionError, lambda: operator.apply(mesh, element)), f"{where} is illegal, yet it works"
+        )
+        return
+    after = operator.apply(mesh, element)
+    _require(mesh == untouched, f"{where} changed the mesh that it was given")
+    _require(after == operator.apply(mesh, element), f"{where} does not give the same twice")
+    _require(is_valid(after), f"{where} gives a mesh that is not valid")
+    n_vertices, n_edges, n_faces = after.counts
+    parts, holes = after.topology.n_components, after.topology.n_holes
+    _require(n_vertices - n_edges + n_faces == parts - holes, f"{where} breaks V - E + F = components - holes")
+    allowed = operator.changes[element % len(operator.changes)]
+    for letter, old, new, change in zip("VEF", mesh.counts, after.counts, allowed, strict=True):
+        kept = new - old == change if change > 0 else new - old <= change
+        _require(kept, f"{where} changes {letter} by {new - old}, not by {change}")
+    for kind in ("vertex", "face"):
+        ids, next_id = getattr(after, f"{kind}_ids"), getattr(mesh, f"next_{kind}_id")
+        old_ids = getattr(mesh, f"{kind}_ids")
+        fresh = [name for name in ids if name not in old_ids]
+        _require(all(name >= next_id for name in fresh), f"{where} reuses {kind} ids: {fresh}")
+        survivors = [name for name in ids if name in old_ids]
+        _require(
+            survivors == [name for name in old_ids if name in ids], f"{where} puts the {kind} ids in another order"
+        )
+
+
+def _checked_transition(simulator: Simulator, state: State, action: Any, where: str) -> State:
+    where = f"{where}, {action.operator} {action.element}"
+    before = pickle.dumps(state)
+    after = simulator.transition(state, action)
+    _require(_same_state(after, simulator.transition(state, action)), f"{where} does not give the same state twice")
+    (batched,) = simulator.transition_all(state, [action]) or (None,)
+    _require(batched is not None and _same_state(after, batched), f"{where} gives another state in transition_all")
+    _require(pickle.dumps(state) == before, f"{where} changed the state that it started from")
+    _require(_same_state(after, pickle.loads(pickle.dumps(after))), f"{where}: the state does not survive pickling")
+    _require(after.score == simulator.score(after.mesh), f"{where}: the score is not that of the mesh")
+    _require(after.step == state.step + 1, f"{where}: the step is not counted")
+    _require(is_valid(after.mesh), f"{where} gives a mesh that is not valid")
+    _require(bool(after.done) or after.step < simulator.max_steps, f"{where}: max_steps is not kept")
+    return after
+
+
+def _same_state(a: State, b: State) -> bool:
+    return a.mesh == b.mesh and (a.score, a.step, a.done, a.action, a.choice) == (
+        b.score, b.step, b.done, b.action, b.choice
+    )  # fmt: skip
+
+
+def _checked_step(env: Any, action: int, before: dict[str, Any], where: str) -> tuple[Any, ...]:
+    mask = before["action_mask"]
+    _require(np.array_equal(mask == 1, env.unwrapped.action_masks()), f"{where}: action_masks() is not the info's mask")
+    outcome = env.step(action)
+    info = outcome[-1]
+    types = [{name: type(value) for name, value in one.items()} for one in (before, info)]
+    _require(types[0] == types[1], f"{where}: the infos have other keys or types than before")
+    illegal = mask[action] == 0
+    _require(info["invalid_action"] == illegal, f"{where}: invalid_action is wrong about action {action}")
+    _require(not illegal or info["r_all"] == before["r_all"], f"{where}: an illegal action changed the shape")
+    return tuple(outcome)
+
+
+def _comparable(outcome: Any) -> tuple[Any, ...]:
+    """Reward, end and info of a step as values that == compares."""
+    _, reward, terminated, truncated, info = outcome
+    plain = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in info.items()}
+    return reward, terminated, truncated, plain
+
+
+def _raises(error: type[AutoPolyError], call: Callable[[], object]) -> bool:
+    try:
+        call()
+    except error:
+        return True
+    return False
+
+
+def _require(holds: bool | np.bool_, rule: str) -> None:
+    if not holds:
+        raise ConformanceError(rule)
