@@ -170,7 +170,7 @@ class Simulator:
             n_refits = 0
         else:
             fits = yield [self._refit_job(mesh, THOROUGH) for _, mesh in begin]
-            k = min(range(len(fits)), key=lambda k: fits[k].loss)
+            k = min(range(len(fits)), key=lambda k: (sum(defects_of(fits[k].mesh)), fits[k].loss))
             choice, mesh, n_refits = begin[k][0], fits[k].mesh, len(fits)
         after = State(mesh, self.score(mesh), state.step + 1, "", action, choice, n_refits)
         return self._ended(after)

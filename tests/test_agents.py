@@ -1,6 +1,7 @@
 """What every agent promises, and how beam search goes about it, on trees drawn by hand."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -322,6 +323,7 @@ def test_random__plays_legal_actions_for_so_many_steps() -> None:
         state = game.transition(state, decision.action)
     assert len(played) > 1
     assert agent.act(game, state) == Decision(STOP)
+    assert len({agent.act(game, replace(state, step=step)).action for step in range(6)}) > 1
 
 
 def test_random__stops_where_it_is_over() -> None:
