@@ -46,7 +46,12 @@ def solve(
     images: Annotated[
         list[str], typer.Argument(metavar="IMAGE", help="Files, folders or patterns; ** crosses folders.")
     ],
-    agent: Annotated[str, typer.Option(help="Who builds: trace, climb, beam, greedy or random.")] = DEFAULT_AGENT,
+    agent: Annotated[
+        str,
+        typer.Option(
+            help="Who builds: climb, trace, mcts, mcts_paper, decimate, beam, greedy, random, dr-simple or dr-complex."
+        ),
+    ] = DEFAULT_AGENT,
     operators: Annotated[str, typer.Option(help="paper, full, or operators, separated by commas.")] = "full",
     w_sm: Annotated[float, typer.Option(help="Weight of the IoU.")] = 100.0,
     w_sc: Annotated[float, typer.Option(help="Weight of the complexity V + E + F.")] = 0.3,
