@@ -9,7 +9,11 @@ from pydantic import TypeAdapter, ValidationError
 from agents.base import Agent
 from agents.beam import BeamAgent, BeamConfig
 from agents.climb import ClimbAgent, ClimbConfig
+from agents.decimate import DecimateAgent, DecimateConfig
+from agents.fixed_topology import DrComplexConfig, DrSimpleConfig, dr_complex, dr_simple
 from agents.random_agent import RandomAgent, RandomConfig
+from agents.search.config import PAPER, MctsConfig
+from agents.search.mcts import MctsAgent, PaperMctsAgent
 from agents.trace.agent import TraceAgent, TraceConfig
 from autopoly_env.errors import ConfigError
 
@@ -18,12 +22,25 @@ class _Greedy(BeamAgent):
     name = "greedy"
 
 
+def _mcts(config: MctsConfig) -> Agent:
+    return MctsAgent(config, [make_agent(name) for name in config.seeds])
+
+
+def _mcts_paper(config: MctsConfig) -> Agent:
+    return PaperMctsAgent(config, [make_agent(name) for name in config.seeds])
+
+
 AGENTS: dict[str, tuple[Callable[[Any], Agent], Any]] = {
     "random": (RandomAgent, RandomConfig()),
     "greedy": (_Greedy, BeamConfig(width=1)),
     "beam": (BeamAgent, BeamConfig()),
     "trace": (TraceAgent, TraceConfig()),
     "climb": (ClimbAgent, ClimbConfig()),
+    "decimate": (DecimateAgent, DecimateConfig()),
+    "mcts": (_mcts, MctsConfig()),
+    "mcts_paper": (_mcts_paper, PAPER),
+    "dr-simple": (dr_simple, DrSimpleConfig()),
+    "dr-complex": (dr_complex, DrComplexConfig()),
 }
 
 

@@ -1,0 +1,1 @@
+"""Monte Carlo tree search: tree, selection, expansion, simulation and backup, each in its own file."""

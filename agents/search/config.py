@@ -1,0 +1,56 @@
+"""`MctsConfig`: every choice of the search, and the paper's choices."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from autopoly_env.errors import ConfigError
+
+
+@dataclass(frozen=True)
+class MctsConfig:
+    """How `mcts` searches."""
+
+    seeds: tuple[str, ...] = ("climb",)  # agents whose best shape it goes on from, before it begins at the rectangle
+    n_simulations: int = 16  # before a step is committed
+    prior: Literal["residual", "uniform"] = "residual"
+    formula: Literal["puct", "uct"] = "puct"
+    exploration: float = 0.02  # the formula's constant, for values normalised to 0..1
+    n_expanded: int = 4  # children made at once, the most promising first
+    widening: float = 0.5  # a node has at most n_expanded * visits ** widening children; 1 is no limit
+    n_rollout: int = 0  # steps of a roll-out, the paper's N_sim
+    value: Literal["best", "final", "discounted"] = "best"  # of a leaf and its roll-out
+    discount: float = 1.0  # per step, of what is backed up and of value "discounted"
+    backup: Literal["max", "mean"] = "max"
+    commit: Literal["value", "visits"] = "value"  # of the root children, the one that has most is taken
+    halving: bool = False  # sequential halving at the root
+    reuse_tree: bool = True  # keep what is below the child that is taken
+    merge: bool = True  # do not go on from a shape that the tree has already
+    patience: int = 4  # committed steps in a row that may fail to improve the best shape
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        least = {"n_simulations": 1, "n_expanded": 1, "patience": 1, "n_rollout": 0, "exploration": 0.0, "seed": 0}
+        for name, bound in least.items():
+            if not getattr(self, name) >= bound:
+                raise ConfigError(f"{name} = {getattr(self, name)}: expected at least {bound}")
+        if not 0.0 <= self.widening <= 1.0:
+            raise ConfigError(f"widening = {self.widening}: expected an exponent, 0 to 1")
+        if not 0.0 < self.discount <= 1.0:
+            raise ConfigError(f"discount = {self.discount}: expected above 0, at most 1")
+
+
+# A new tree for every step, random expansion by one child, random roll-outs of three steps, mean of the final r_all.
+PAPER = MctsConfig(
+    seeds=(),
+    n_simulations=50,
+    prior="uniform",
+    formula="uct",
+    exploration=0.5,
+    n_expanded=1,
+    widening=1.0,
+    n_rollout=3,
+    value="final",
+    backup="mean",
+    reuse_tree=False,
+    merge=False,
+)

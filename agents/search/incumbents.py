@@ -1,0 +1,50 @@
+"""Other agents' solutions as the shape that the search goes on from."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from agents.base import Agent, Meter, Progress, Solution, Track
+from autopoly_env.actions import Action
+from autopoly_env.operators import OPERATORS
+from autopoly_env.sequence import ConstructionSequence
+from autopoly_env.sequence_ids import choice_indices, element_index
+from autopoly_env.simulator import Simulator
+
+
+def play(agents: Sequence[Agent], simulator: Simulator, meter: Meter) -> Iterator[Solution]:
+    """The agents' solutions, as far as the budget goes. Raises KeyboardInterrupt after one that was interrupted."""
+    for agent in agents:
+        if meter.spent():
+            return
+        solution = _solve_within(agent, simulator, meter)
+        yield solution
+        if solution.stats.stopped_by == "interrupted":
+            raise KeyboardInterrupt
+
+
+def _solve_within(agent: Agent, simulator: Simulator, meter: Meter) -> Solution:
+    """What the agent finds with the rest of the meter's budget; its work is counted and reported as it goes."""
+    n_counted = 0
+
+    def report(progress: Progress) -> None:
+        nonlocal n_counted
+        n_new, n_counted = progress.n_refits - n_counted, progress.n_refits
+        meter.count(n_new, progress.best_total)
+
+    return agent.solve(simulator, meter.rest(), report)
+
+
+def track_of(simulator: Simulator, sequence: ConstructionSequence) -> Track:
+    """The states that a sequence goes through, scored as the simulator scores; the last may have ended."""
+    meshes = sequence.meshes()
+    track = Track(simulator.initial(sequence.start))
+    for number, (step, before, after) in enumerate(zip(sequence.steps, meshes, meshes[1:], strict=False), 1):
+        operator = OPERATORS[step.operator]
+        element = element_index(before, operator.element, step.element)
+        choice = choice_indices(before, operator, element, step.choice)
+        state = simulator.initial(after)
+        over = state.done or ("max_steps" if number >= simulator.max_steps else "")
+        track = Track(
+            replace(state, step=number, done=over, action=Action(step.operator, element), choice=choice), track
+        )
+    return track
