@@ -68,6 +68,8 @@ class ClimbAgent(Agent):
                 solution = BeamAgent(BeamConfig(width=1)).solve(simulator, meter.rest())
                 meter.count(solution.stats.n_refits, solution.score.total)
                 candidates.append(solution)
+                if solution.stats.stopped_by == "interrupted":
+                    raise KeyboardInterrupt
                 outline = outline_of_mesh(solution.mesh)
                 if outline is not None:
                     tops += [outline, self._climb(simulator, outline, meter)]

@@ -15,7 +15,7 @@ from autopoly_env.silhouette import load_silhouette
 from autopoly_env.simulator import Simulator
 from benchmarks.report import Must, Record, Row, quantity
 
-AGENTS = ("greedy", "beam", "trace")
+AGENTS = ("greedy", "beam", "trace", "climb")
 WEIGHTS = (0.3, 1.0)  # w_sc
 NO_DEFECTS = Must("<=", 0.0)
 # The floors hold for the silhouettes that they were set on, a folder of this many with a manifest.
@@ -102,7 +102,7 @@ def _summary(solved: Sequence[Solved], has_floors: bool) -> Iterator[Row]:
     seconds = float(np.median([one.seconds for one in solved]))
     cpu = float(np.median([one.cpu_seconds for one in solved]))
     note = f"CPU {quantity(cpu, 's')}, slowest {quantity(max(one.seconds for one in solved), 's')}"
-    must = Must("<=", _SECONDS[name]) if has_floors else None
+    must = Must("<=", _SECONDS[name]) if has_floors and name in _SECONDS else None
     yield Row(f"{label}: median time", seconds, must=must, unit="s", note=note)
     defects = sum(one.self_intersections + one.flipped_faces for one in solved)
     yield Row(f"{label}: defects", float(defects), must=NO_DEFECTS, note="self-intersections and flipped faces")

@@ -29,6 +29,7 @@ GROUPS = {
     "gradient": ("gradient against central differences", "benchmarks.rendering", "gradient_rows", False),
     "refit": ("16-gon from a circle to the horse at 64", "benchmarks.refitting", "refit_rows", False),
     "threads": ("simulator", "benchmarks.simulation", "thread_rows", True),
+    "environment": ("environment, random legal actions at 64", "benchmarks.environment", "environment_rows", False),
     "import": ("import", "benchmarks.importing", "import_rows", False),
     "agents": ("agents", "benchmarks.agents", "agent_rows", True),
 }
