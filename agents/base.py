@@ -5,7 +5,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
-from autopoly_env.actions import Action
+from autopoly_env.actions import STOP, Action
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.score import Score
@@ -169,6 +169,26 @@ class Agent(ABC):
             meter.add([state])
             track = Track(state, track)
             yield track
+
+
+class WholeAgent(Agent):
+    """Finds its shape as a whole instead of playing step by step."""
+
+    def act(self, simulator: Simulator, state: State) -> Decision:
+        """Always STOP: only `solve` finds shapes."""
+        return Decision(STOP)
+
+    def solve(
+        self,
+        simulator: Simulator,
+        budget: Budget | None = None,
+        on_progress: Callable[[Progress], None] | None = None,
+    ) -> Solution:
+        return self._find(simulator, Meter(budget or Budget(), on_progress))
+
+    @abstractmethod
+    def _find(self, simulator: Simulator, meter: Meter) -> Solution:
+        """As `solve`, within what `meter` allows."""
 
 
 def finish(simulator: Simulator, states: Sequence[State], meter: Meter) -> Solution:

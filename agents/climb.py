@@ -4,26 +4,26 @@ Of two meshes with the same outline the score prefers the one with fewer inner e
 (rings of vertices) and builds a mesh only in the end. Every neighbour of an outline is refitted before it is judged.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 import shapely
 
-from agents.base import Agent, Budget, Decision, Meter, Progress, Solution, finish
+from agents.base import Meter, Solution, WholeAgent, finish
 from agents.beam import BeamAgent, BeamConfig
 from agents.trace.agent import TraceAgent, TraceConfig, build_best, final_total
 from agents.trace.outline import Outline, outline_of, outline_of_mesh
 from agents.trace.reach import Reach
 from agents.trace.rings import Ring, signed_area, trace_rings
 from agents.trace.simplify import Contour
-from autopoly_env.actions import STOP, Action
+from autopoly_env.actions import Action
 from autopoly_env.arrays import FloatArray
 from autopoly_env.parallel import map_threads
 from autopoly_env.placement import Disagreement, hole_shapes, starts
 from autopoly_env.refit import LOCAL, THOROUGH, RefitConfig, RefitTarget
-from autopoly_env.simulator import Simulator, State
+from autopoly_env.simulator import Simulator
 
 _NEW_RING_SIZES = (3, 4, 5, 6, 8)
 
@@ -40,7 +40,7 @@ class ClimbConfig:
     n_rounds: int = 60
 
 
-class ClimbAgent(Agent):
+class ClimbAgent(WholeAgent):
     """Traces and searches greedily, then climbs from each result; returns the best."""
 
     name = "climb"
@@ -48,17 +48,7 @@ class ClimbAgent(Agent):
     def __init__(self, config: ClimbConfig) -> None:
         self._config = config
 
-    def act(self, simulator: Simulator, state: State) -> Decision:
-        """Always STOP: the shape is found as a whole, by `solve`."""
-        return Decision(STOP)
-
-    def solve(
-        self,
-        simulator: Simulator,
-        budget: Budget | None = None,
-        on_progress: Callable[[Progress], None] | None = None,
-    ) -> Solution:
-        meter = Meter(budget or Budget(), on_progress)
+    def _find(self, simulator: Simulator, meter: Meter) -> Solution:
         tops: list[Outline] = []
         candidates = []
         try:

@@ -5,17 +5,16 @@ order is Visvalingam's (see `agents.trace.simplify_kernels`), but of several lea
 loss the others make up for best.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from agents.base import Agent, Budget, Decision, Meter, Progress, Solution, finish
+from agents.base import Meter, Solution, WholeAgent, finish
 from agents.trace.agent import TraceAgent, TraceConfig, build_best, final_total
 from agents.trace.outline import Outline
 from agents.trace.reach import Reach
 from agents.trace.rings import Ring
-from autopoly_env.actions import STOP
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import ConfigError
 from autopoly_env.parallel import map_threads
@@ -40,7 +39,7 @@ class DecimateConfig:
             raise ConfigError(f"max_vertices {self.max_vertices}: expected at least 4, the rectangle's")
 
 
-class DecimateAgent(Agent):
+class DecimateAgent(WholeAgent):
     """Decimates fine traces; returns the best outline on the way that has few enough vertices."""
 
     name = "decimate"
@@ -48,17 +47,7 @@ class DecimateAgent(Agent):
     def __init__(self, config: DecimateConfig) -> None:
         self._config = config
 
-    def act(self, simulator: Simulator, state: State) -> Decision:
-        """Always STOP: the shape is found as a whole, by `solve`."""
-        return Decision(STOP)
-
-    def solve(
-        self,
-        simulator: Simulator,
-        budget: Budget | None = None,
-        on_progress: Callable[[Progress], None] | None = None,
-    ) -> Solution:
-        meter = Meter(budget or Budget(), on_progress)
+    def _find(self, simulator: Simulator, meter: Meter) -> Solution:
         found: list[Outline] = []
         try:
             for outline in self.outlines(simulator, meter):

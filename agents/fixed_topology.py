@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from agents.base import Agent, Budget, Decision, Meter, Progress, Solution, finish
-from autopoly_env.actions import STOP
+from agents.base import Meter, Solution, WholeAgent, finish
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.refit import FROM_AFAR, RefitTarget, refit
@@ -33,25 +32,15 @@ class DrComplexConfig:
             raise ConfigError(f"n = {self.n}: expected a grid of 1 to 5 quads a side")
 
 
-class FixedTopologyAgent(Agent):
+class FixedTopologyAgent(WholeAgent):
     """Returns the one state that it is made with."""
 
     def __init__(self, name: str, refitted: Callable[[Simulator], State]) -> None:
         self.name = name
         self._refitted = refitted
 
-    def act(self, simulator: Simulator, state: State) -> Decision:
-        """Always STOP."""
-        return Decision(STOP)
-
-    def solve(
-        self,
-        simulator: Simulator,
-        budget: Budget | None = None,
-        on_progress: Callable[[Progress], None] | None = None,
-    ) -> Solution:
+    def _find(self, simulator: Simulator, meter: Meter) -> Solution:
         """The refitted mesh, whatever the budget."""
-        meter = Meter(budget or Budget(), on_progress)
         state = self._refitted(simulator)
         try:
             meter.add([state])

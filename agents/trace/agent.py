@@ -4,20 +4,19 @@ For every contour the best polygon of every size is known (`simplify`). A sweep 
 each, all are refitted together, and the outline with the best score is told as a construction sequence (`construct`).
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain, count
 
 import numpy as np
 import shapely
 
-from agents.base import Agent, Budget, Decision, Meter, Progress, Solution, finish
+from agents.base import Meter, Solution, WholeAgent, finish
 from agents.trace.construct import UnbuildableError, construct
 from agents.trace.outline import Outline, outline_of
 from agents.trace.reach import Reach
 from agents.trace.rings import Ring, signed_area, trace_rings
 from agents.trace.simplify import Contour
-from autopoly_env.actions import STOP
 from autopoly_env.errors import ConfigError
 from autopoly_env.refit import LOCAL, THOROUGH, RefitTarget
 from autopoly_env.score import ScoreWeights
@@ -41,7 +40,7 @@ class TraceConfig:
             raise ConfigError(f"n_constructed {self.n_constructed}: expected at least 1")
 
 
-class TraceAgent(Agent):
+class TraceAgent(WholeAgent):
     """Traces, simplifies, refits once or twice per price, and constructs the best."""
 
     name = "trace"
@@ -49,17 +48,7 @@ class TraceAgent(Agent):
     def __init__(self, config: TraceConfig) -> None:
         self._config = config
 
-    def act(self, simulator: Simulator, state: State) -> Decision:
-        """Always STOP: the trace is found as a whole, by `solve`."""
-        return Decision(STOP)
-
-    def solve(
-        self,
-        simulator: Simulator,
-        budget: Budget | None = None,
-        on_progress: Callable[[Progress], None] | None = None,
-    ) -> Solution:
-        meter = Meter(budget or Budget(), on_progress)
+    def _find(self, simulator: Simulator, meter: Meter) -> Solution:
         outlines: list[Outline] = []
         try:
             for outline in self.outlines(simulator, meter):
