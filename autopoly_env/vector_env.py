@@ -19,9 +19,9 @@ Start = tuple[Observation, dict[str, Any]]
 class AutoPolyVectorEnv(SyncVectorEnv):
     """Gymnasium's SyncVectorEnv over `num_envs` AutoPolyEnvs, except that it steps all of them at once.
 
-    Nearly all of a step runs in kernels without the GIL, so threads are enough, as many as
-    `autopoly_env.parallel.n_threads()` says, and no process needs to be fed. Seeds, autoreset, `reset_mask`, infos,
-    `call`, `get_attr` and every number that comes out are SyncVectorEnv's.
+    The refits, more than half of a step, run in kernels without the GIL: threads do them, as many as
+    `autopoly_env.parallel.n_threads()` says, while the calling thread does the rest. Seeds, autoreset, `reset_mask`,
+    infos, `call`, `get_attr` and every number that comes out are SyncVectorEnv's.
 
     `autoreset_mode` is a `gymnasium.vector.AutoresetMode` or its value, `settings` are AutoPolyEnv's arguments. Raises
     ConfigError for what is not allowed.
