@@ -40,9 +40,7 @@ def _names(node: ast.AST, package: list[str]) -> Iterator[str]:
             base = [*above, *([module] if module else [])]
             yield from (".".join([*base, alias.name]) for alias in names)
         case ast.Call(func=ast.Attribute(attr="import_module") | ast.Name(id="import_module" | "__import__")):
-            yield from (
-                a.value for a in node.args if isinstance(a, ast.Constant) and isinstance(a.value, str)
-            )
+            yield from (a.value for a in node.args if isinstance(a, ast.Constant) and isinstance(a.value, str))
 
 
 def lies_in(path: Path, places: tuple[str, ...]) -> bool:

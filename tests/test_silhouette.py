@@ -350,13 +350,9 @@ def write_huge_png(path: Path, side: int) -> None:
     for block in blocks:
         checksum = zlib.adler32(block, checksum)
     packed = {block: deflated(block) for block in (blank_rows, object_rows)}
-    data = (
-        b"\x78\x01" + b"".join(packed[block] for block in blocks) + b"\x03\x00" + struct.pack(">I", checksum)
-    )
+    data = b"\x78\x01" + b"".join(packed[block] for block in blocks) + b"\x03\x00" + struct.pack(">I", checksum)
     header = struct.pack(">IIBBBBB", side, side, 8, 0, 0, 0, 0)
-    path.write_bytes(
-        b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", data) + chunk(b"IEND", b"")
-    )
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", data) + chunk(b"IEND", b""))
 
 
 LOAD_AND_MEASURE = """

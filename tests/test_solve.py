@@ -433,7 +433,8 @@ def test_ctrl_c_in_the_shell__leaves_finished_images_whole() -> None:
 
 
 def test_help__names_every_agent_and_loads_nothing_heavy() -> None:
-    code = "import sys, agents.solve; agents.solve.main(['--help']); assert not {'numba', 'skimage', 'shapely'} & set(sys.modules)"
+    heavy = {"numba", "skimage", "shapely"}
+    code = f"import sys, agents.solve; agents.solve.main(['--help']); assert not {heavy} & set(sys.modules)"
     env = os.environ | {"PYTHONPATH": str(ROOT)}
     shown = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True).stdout
     assert set(AGENTS) <= set(shown.replace(",", " ").replace(".", " ").split())
