@@ -6,10 +6,13 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from autopoly_env.actions import STOP, Action
+from autopoly_env.edits import Choice
 from autopoly_env.errors import ConfigError
+from autopoly_env.guidance import continued
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.score import Score
 from autopoly_env.sequence import ConstructionSequence
+from autopoly_env.sequence_file import Score as PlainScore
 from autopoly_env.simulator import Simulator, State
 
 
@@ -135,6 +138,7 @@ class Agent(ABC):
     """Chooses actions. `solve` plays them out; an agent that does not play step by step overrides it instead."""
 
     name = "agent"
+    takes_guidance = True  # a start mesh, locked vertices and symmetry, which the transitions it plays keep to
 
     @abstractmethod
     def act(self, simulator: Simulator, state: State) -> Decision:
@@ -172,7 +176,9 @@ class Agent(ABC):
 
 
 class WholeAgent(Agent):
-    """Finds its shape as a whole instead of playing step by step."""
+    """Finds its shape as a whole instead of playing step by step, and so without guidance."""
+
+    takes_guidance = False
 
     def act(self, simulator: Simulator, state: State) -> Decision:
         """Always STOP: only `solve` finds shapes."""
@@ -184,6 +190,8 @@ class WholeAgent(Agent):
         budget: Budget | None = None,
         on_progress: Callable[[Progress], None] | None = None,
     ) -> Solution:
+        """As every agent. Raises ConfigError where the simulator has guidance that it cannot take."""
+        check_guidance(self, simulator.guidance.names)
         return self._find(simulator, Meter(budget or Budget(), on_progress))
 
     @abstractmethod
@@ -191,17 +199,47 @@ class WholeAgent(Agent):
         """As `solve`, within what `meter` allows."""
 
 
+def check_guidance(agent: Agent, names: Sequence[str]) -> None:
+    """Raise ConfigError if an agent cannot take the guidance of these names (start, locked, symmetry)."""
+    if names and not agent.takes_guidance:
+        raise ConfigError(
+            f"{agent.name} finds outlines as a whole and cannot heed {names[0]!r}: choose an agent that plays step by "
+            "step, which are beam, greedy, random and mcts"
+        )
+
+
 def finish(simulator: Simulator, states: Sequence[State], meter: Meter) -> Solution:
-    """The solution that `states` construct, the last mesh polished, scored at the silhouette's own resolution."""
+    """The solution that `states` construct, the last mesh polished, scored at the silhouette's own resolution.
+
+    A start mesh that nothing was done to stays as it is; a sequence that was gone on from comes before the new steps.
+    """
     meshes = [state.mesh for state in states]
-    meshes[-1] = simulator.polish(meshes[-1])
+    if len(meshes) > 1 or simulator.guidance.start is None:
+        meshes[-1] = simulator.polish(meshes[-1])
     scores = [simulator.final_score(mesh) for mesh in meshes]
     last = max(range(len(scores)), key=lambda k: (scores[k].total, -k))
     settings = {**simulator.settings(), "scored_at": simulator.silhouette.resolution}
     transitions = [
-        (state.action, state.choice, mesh, score.as_dict())
+        transition
         for state, mesh, score in zip(states[1 : last + 1], meshes[1:], scores[1:], strict=False)
-        if state.action is not None
+        for transition in _transitions_of(simulator, state, mesh, score)
     ]
     sequence = ConstructionSequence.record(settings, meshes[0], scores[0].as_dict(), transitions)
+    earlier = simulator.guidance.earlier
+    if earlier is not None:
+        sequence = continued(earlier, sequence, [simulator.final_score(mesh).as_dict() for mesh in earlier.meshes()])
     return Solution(sequence, meshes[last], scores[last], meter.stats())
+
+
+def _transitions_of(
+    simulator: Simulator, state: State, mesh: PolyMesh, score: Score
+) -> Iterator[tuple[Action, Choice | None, PolyMesh, PlainScore]]:
+    """The steps, one or two, that led to a state, with `mesh` for its mesh, as a sequence records them."""
+    if state.action is None:
+        return
+    if state.halfway is None:
+        yield state.action, state.choice, mesh, score.as_dict()
+        return
+    between = state.halfway
+    yield state.action, state.choice, between.mesh, simulator.final_score(between.mesh).as_dict()
+    yield between.action, between.choice, mesh, score.as_dict()

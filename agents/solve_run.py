@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from agents.base import Agent, Budget
+from agents.base import Agent, Budget, check_guidance
 from agents.registry import AGENTS, make_agent
 from agents.solve_files import OVERVIEW, RESULTS, Overview, Result, write_results
+from agents.solve_guidance import NO_WISHES, Wishes
 from agents.solve_report import Report
 from autopoly_env.errors import AutoPolyError, ConfigError
 from autopoly_env.export import save_png
@@ -34,11 +35,17 @@ class Settings:
     max_steps: int
     weights: ScoreWeights
     budget: Budget
+    wishes: Wishes = NO_WISHES
 
     def check(self) -> None:
         """Raise ConfigError for whatever is wrong, before any image is read."""
-        self.new_agent()
-        self.simulator(Silhouette(np.ones((1, 1), np.bool_)))
+        agent = self.new_agent()
+        wishes = self.wishes
+        if wishes.symmetry is True and wishes.start is not None:  # whether they agree is seen with the image
+            wishes = replace(wishes, symmetry=None)
+        wishes = replace(wishes, importance=None)  # so is whether it has the image's proportions
+        dummy = replace(self, wishes=wishes).simulator(Silhouette(np.ones((1, 1), np.bool_)))
+        check_guidance(agent, dummy.guidance.names)
         n_threads()
 
     def new_agent(self) -> Agent:
@@ -55,12 +62,14 @@ class Settings:
             resolution=self.resolution,
             weights=self.weights,
             max_steps=self.max_steps,
+            **self.wishes.for_simulator(),
         )
 
     def as_dict(self) -> dict[str, Any]:
         """What a construction sequence keeps beside the simulator's settings."""
         seed = self.options.get("seed", self.seed)
-        return {"agent": self.agent, "options": self.options, "seed": seed, "budget": asdict(self.budget)}
+        settings = {"agent": self.agent, "options": self.options, "seed": seed, "budget": asdict(self.budget)}
+        return {**settings, "guided_by": self.wishes.files} if self.wishes.files else settings
 
 
 @dataclass(frozen=True)

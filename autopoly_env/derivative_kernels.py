@@ -2,6 +2,10 @@
 
 Only touched cells depend on the vertices; the rest of a row is constant spans, whose squared error prefix sums of the
 target give. Letters and units as in `raster_kernels`.
+
+Pixels may have weights: `weight_sum` (R, R+1) are prefix sums of them along the rows, and `row_sum` and
+`row_square_sum` are then those of weight * target and of weight * target**2. Without (None) every pixel weighs 1, and
+Numba compiles kernels that know of no weights.
 """
 
 import numpy as np
@@ -20,6 +24,7 @@ from autopoly_env.raster_kernels import (
     START,
     Workspace,
     clear,
+    span_weight,
     walk_boundary,
 )
 
@@ -27,7 +32,7 @@ from autopoly_env.raster_kernels import (
 @kernel
 def half_gradient(
     points: FloatArray, edges: IntArray, size: int, coverage: FloatArray, row_sum: FloatArray,
-    row_square_sum: FloatArray, work: Workspace, gradient: FloatArray,
+    row_square_sum: FloatArray, work: Workspace, gradient: FloatArray, weight_sum: FloatArray | None = None,
 ) -> float:  # fmt: skip
     """Return the sum over pixels of (coverage - target)**2; write half its gradient per pixel into `gradient` (V, 2).
 
@@ -48,24 +53,34 @@ def half_gradient(
                 bits &= bits - np.uint64(1)
                 cell = row * (size + PADDING) + here
                 if here > column:
-                    loss += _span_loss(total, row, column, here, row_sum, row_square_sum)
+                    loss += _span_loss(total, row, column, here, row_sum, row_square_sum, weight_sum)
                 residual = total + work.cells[cell, AREA] - coverage[row, here]
                 total += work.cells[cell, COVER]
-                loss += residual * residual
-                _pull(points, edges, size, cell, residual, work, gradient)
+                pull = _weighed(residual, row, here, weight_sum)
+                loss += residual * pull
+                _pull(points, edges, size, cell, pull, work, gradient)
                 clear(cell, work)
                 column = here + 1
-        loss += _span_loss(total, row, column, size, row_sum, row_square_sum)
+        loss += _span_loss(total, row, column, size, row_sum, row_square_sum, weight_sum)
     return loss if not loss < 0.0 else 0.0  # differences of prefix sums may round to less than nothing
 
 
 @kernel
+def _weighed(residual: float, row: int, column: int, weight_sum: FloatArray | None) -> float:
+    """The residual of a pixel times its weight."""
+    if weight_sum is None:
+        return residual
+    return residual * (weight_sum[row, column + 1] - weight_sum[row, column])
+
+
+@kernel
 def _span_loss(
-    total: float, row: int, first: int, last: int, row_sum: FloatArray, row_square_sum: FloatArray
+    total: float, row: int, first: int, last: int, row_sum: FloatArray, row_square_sum: FloatArray,
+    weight_sum: FloatArray | None,
 ) -> float:  # fmt: skip
     """Squared error of the untouched pixels first..last-1 of a row, which the mesh covers `total` times."""
     return (
-        total * total * (last - first)
+        total * total * span_weight(row, first, last, weight_sum)
         - 2.0 * total * (row_sum[row, last] - row_sum[row, first])
         + (row_square_sum[row, last] - row_square_sum[row, first])
     )
@@ -92,10 +107,10 @@ def _pull(
 @kernel
 def loss_and_gradient(
     points: FloatArray, edges: IntArray, size: int, coverage: FloatArray, row_sum: FloatArray,
-    row_square_sum: FloatArray, work: Workspace, gradient: FloatArray,
+    row_square_sum: FloatArray, work: Workspace, gradient: FloatArray, weight_sum: FloatArray | None = None,
 ) -> float:  # fmt: skip
     """Sum of squared coverage errors; its gradient with respect to unit-square positions goes into `gradient`."""
-    loss = half_gradient(points, edges, size, coverage, row_sum, row_square_sum, work, gradient)
+    loss = half_gradient(points, edges, size, coverage, row_sum, row_square_sum, work, gradient, weight_sum)
     for v in range(gradient.shape[0]):
         gradient[v, 0] *= 2.0 * size
         gradient[v, 1] *= 2.0 * size
@@ -106,8 +121,9 @@ def loss_and_gradient(
 def normal_equations(
     points: FloatArray, edges: IntArray, size: int, coverage: FloatArray, row_sum: FloatArray,
     row_square_sum: FloatArray, work: Workspace, gradient: FloatArray, normal: FloatArray,
+    weight_sum: FloatArray | None = None,
 ) -> float:  # fmt: skip
-    """As `half_gradient`, and write the lower triangle of J'J (2V, 2V): unknown 2v is x of vertex v, 2v+1 its y."""
+    """As `half_gradient`, and write the lower triangle of J'WJ (2V, 2V): unknown 2v is x of vertex v, 2v+1 its y."""
     walk_boundary(points, edges, size, work)
     words = (size + 63) >> 6
     vertices = np.empty(points.shape[0], np.int64)
@@ -126,16 +142,31 @@ def normal_equations(
                 bits &= bits - np.uint64(1)
                 cell = row * (size + PADDING) + here
                 if here > column:
-                    loss += _span_loss(total, row, column, here, row_sum, row_square_sum)
+                    loss += _span_loss(total, row, column, here, row_sum, row_square_sum, weight_sum)
                 residual = total + work.cells[cell, AREA] - coverage[row, here]
                 total += work.cells[cell, COVER]
-                loss += residual * residual
                 m = _cell_jacobian(points, edges, size, cell, work, vertices, rows)
+                residual = _scaled_row(m, residual, row, here, rows, weight_sum)
+                loss += residual * residual
                 _add_outer_product(m, residual, vertices, rows, gradient, normal)
                 clear(cell, work)
                 column = here + 1
-        loss += _span_loss(total, row, column, size, row_sum, row_square_sum)
+        loss += _span_loss(total, row, column, size, row_sum, row_square_sum, weight_sum)
     return loss if not loss < 0.0 else 0.0
+
+
+@kernel
+def _scaled_row(
+    m: int, residual: float, row: int, column: int, rows: FloatArray, weight_sum: FloatArray | None
+) -> float:  # fmt: skip
+    """Multiply a pixel's row of the Jacobian, `rows[:m]`, by the root of its weight; return the residual times that."""
+    if weight_sum is None:
+        return residual
+    root = np.sqrt(weight_sum[row, column + 1] - weight_sum[row, column])
+    for a in range(m):
+        rows[a, 0] *= root
+        rows[a, 1] *= root
+    return residual * root
 
 
 @kernel
@@ -217,7 +248,7 @@ def vector_jacobian(
 def losses_and_gradients(
     points: FloatArray, edges: IntArray, point_starts: IntArray, edge_starts: IntArray, first: int, last: int,
     coverage: FloatArray, row_sum: FloatArray, row_square_sum: FloatArray, work: Workspace,
-    losses: FloatArray, gradients: FloatArray,
+    losses: FloatArray, gradients: FloatArray, weight_sum: FloatArray | None = None,
 ) -> None:  # fmt: skip
     """`loss_and_gradient` of meshes first..last of a batch, all against one target."""
     size = coverage.shape[0]
@@ -231,6 +262,7 @@ def losses_and_gradients(
             row_square_sum,
             work,
             gradients[point_starts[k] : point_starts[k + 1]],
+            weight_sum,
         )
 
 

@@ -55,8 +55,14 @@ class Disagreement:
     def __init__(self, mesh: PolyMesh, silhouette: Silhouette) -> None:
         self.mesh = mesh
         covered = np.minimum(coverage(mesh, RESOLUTION), 1.0)
-        self.difference: FloatArray = silhouette.target(RESOLUTION).coverage - covered
-        self.labels, self.n_regions = placement_kernels.regions_of(self.difference, THRESHOLD)
+        target = silhouette.target(RESOLUTION)
+        self.difference: FloatArray = target.coverage - covered
+        if target.weights is None:
+            self.labels, self.n_regions = placement_kernels.regions_of(self.difference, THRESHOLD)
+        else:  # what weighs nothing is no reason to act; the rest counts as much as it weighs
+            seen = np.where(target.weights > 0.0, self.difference, 0.0)
+            self.labels, self.n_regions = placement_kernels.regions_of(seen, THRESHOLD)
+            self.difference = self.difference * target.weights
 
     @cached_property
     def blame(self) -> FloatArray:

@@ -60,6 +60,7 @@ def coverage(mesh: PolyMesh, resolution: int) -> FloatArray:
 def loss_and_gradient(mesh: PolyMesh, target: Target) -> tuple[float, FloatArray]:
     """Sum over pixels of (coverage - target)**2, and its gradient (V, 2) with respect to the vertex positions.
 
+    Where the target has weights, each pixel counts by its own.
     Only pixels on the boundary are visited, so the cost grows with R, not with R**2.
     """
     edges = mesh.topology.boundary_half_edges
@@ -73,6 +74,7 @@ def loss_and_gradient(mesh: PolyMesh, target: Target) -> tuple[float, FloatArray
         target.row_square_sum,
         workspace(target.resolution, len(edges)),
         gradient,
+        target.weight_sum,
     )
     return loss, gradient
 
@@ -129,7 +131,9 @@ def loss_and_gradient_many(meshes: Sequence[PolyMesh], target: Target) -> tuple[
 
     def evaluate(first: int, last: int) -> None:
         work = workspace(target.resolution, _most_edges(batch))
-        derivative_kernels.losses_and_gradients(*batch, first, last, *picture, work, losses, gradients)
+        derivative_kernels.losses_and_gradients(
+            *batch, first, last, *picture, work, losses, gradients, target.weight_sum
+        )
 
     _for_each_part(evaluate, batch, target.resolution)
     starts = batch.point_starts.tolist()

@@ -175,10 +175,22 @@ def coverage_image(points: FloatArray, edges: IntArray, size: int, work: Workspa
 
 
 @kernel
+def span_weight(row: int, first: int, last: int, weight_sum: FloatArray | None) -> float:
+    """What the pixels first..last-1 of a row weigh together: each 1, or as `weight_sum` (R, R+1) along rows says."""
+    if weight_sum is None:
+        return last - first
+    return weight_sum[row, last] - weight_sum[row, first]
+
+
+@kernel
 def overlap_counts(
-    points: FloatArray, edges: IntArray, size: int, mask: BoolArray, mask_sum: IntArray, work: Workspace
-) -> tuple[int, int]:
-    """Pixels with coverage >= 0.5: (those inside the target mask, all of them). `mask_sum` (R, R+1) along rows."""
+    points: FloatArray, edges: IntArray, size: int, mask: BoolArray, mask_sum: IntArray | FloatArray, work: Workspace,
+    weight_sum: FloatArray | None = None,
+) -> tuple[float, float]:  # fmt: skip
+    """Pixels with coverage >= 0.5: (those inside the target mask, all of them). `mask_sum` (R, R+1) along rows.
+
+    With `weight_sum` they are not counted but weighed, and `mask_sum` is of the weights, too.
+    """
     walk_boundary(points, edges, size, work)
     words = (size + 63) >> 6
     inside, filled = 0, 0
@@ -193,16 +205,18 @@ def overlap_counts(
                 bits &= bits - np.uint64(1)
                 cell = row * (size + PADDING) + here
                 if total >= 0.5:
-                    filled += here - column
+                    filled += span_weight(row, column, here, weight_sum)
                     inside += mask_sum[row, here] - mask_sum[row, column]
                 if total + work.cells[cell, AREA] >= 0.5:
-                    filled += 1
-                    inside += mask[row, here]
+                    weight = span_weight(row, here, here + 1, weight_sum)
+                    filled += weight
+                    if mask[row, here]:
+                        inside += weight
                 total += work.cells[cell, COVER]
                 column = here + 1
                 clear(cell, work)
         if total >= 0.5:
-            filled += size - column
+            filled += span_weight(row, column, size, weight_sum)
             inside += mask_sum[row, size] - mask_sum[row, column]
     return inside, filled
 

@@ -5,7 +5,10 @@ target per pixel, 2V unknowns, a Jacobian that is zero off the boundary. Levenbe
 pyramid. On the coarse levels an elastic term keeps boundary edges near what they were: it carries an outline to a
 target many pixels away without tangling it, which plain gradient descent (the optional far phase) does not.
 
-Letters: V vertices, R pixels a side. The loss is the sum over pixels of (coverage - target)**2 at the finest level.
+Vertices may be bound (`Bonds`): then fewer unknowns lead, and gradient and normal equations are reduced to those.
+
+Letters: V vertices, R pixels a side. The loss is the sum over pixels of (coverage - target)**2 at the finest level,
+each pixel times its weight where the target has weights.
 """
 
 from collections.abc import Iterable
@@ -15,11 +18,12 @@ from functools import lru_cache
 import numpy as np
 
 from autopoly_env import refit_kernels
+from autopoly_env.arrays import BoolArray, IntArray
 from autopoly_env.errors import MeshError
 from autopoly_env.mesh import PolyMesh, Topology
 from autopoly_env.parallel import map_threads
 from autopoly_env.raster import workspace
-from autopoly_env.refit_kernels import Picture, Settings, Shape
+from autopoly_env.refit_kernels import Picture, Settings, Shape, Ties
 from autopoly_env.silhouette import Silhouette
 
 
@@ -53,13 +57,22 @@ class RefitTarget:
         """Levels R/8, R/4, R/2 and R = `resolution`, none below 8 pixels (or R, if that is less)."""
         sizes = [max(min(8, resolution), resolution // divisor) for divisor in (8, 4, 2, 1)]
         targets = [silhouette.target(size) for size in sizes]
-        pictures = [Picture(t.coverage, t.row_sum, t.row_square_sum) for t in targets]
+        pictures = [Picture(t.coverage, t.row_sum, t.row_square_sum, t.weight_sum) for t in targets]
         return cls((pictures[0], pictures[1], pictures[2], pictures[3]))
 
     @property
     def resolution(self) -> int:
         """R of the finest level."""
         return len(self.pictures[-1].coverage)
+
+
+@dataclass(frozen=True, eq=False)
+class Bonds:
+    """What binds the V vertices of one mesh: some stay where they are, some are mirror images of others."""
+
+    locked: BoolArray  # (V,) those that a refit leaves where they are, bit for bit
+    images: IntArray  # (V,) the mirror image of each boundary vertex, itself on the axis; -1 where there is none
+    axis: float = 0.5  # x of the vertical axis of the mirror
 
 
 @dataclass(frozen=True)
@@ -72,8 +85,10 @@ class RefitResult:
     n_evaluations: int  # renderings with derivatives
 
 
-def refit(mesh: PolyMesh, target: RefitTarget, config: RefitConfig = DEFAULT) -> RefitResult:
-    """Move the vertices of `mesh` to match `target`.
+def refit(
+    mesh: PolyMesh, target: RefitTarget, config: RefitConfig = DEFAULT, bonds: Bonds | None = None
+) -> RefitResult:
+    """Move the vertices of `mesh` to match `target`, as far as `bonds` let them.
 
     The result is finite, its loss is at most that of `mesh`, and unless `config.keep_defects` it has no more
     self-intersections and no more flipped faces. Vertices that would gain nothing stay bit for bit where they are;
@@ -82,7 +97,7 @@ def refit(mesh: PolyMesh, target: RefitTarget, config: RefitConfig = DEFAULT) ->
     """
     if not np.isfinite(mesh.vertices).all():
         raise MeshError("the mesh to refit has vertices that are not finite: give finite positions")
-    shape = shape_of(mesh.topology)
+    shape = shape_of(mesh.topology) if bonds is None else _bound(shape_of(mesh.topology), bonds)
     moved = np.empty_like(mesh.vertices)
     before, after, n_evaluations = refit_kernels.refit(
         mesh.vertices,
@@ -106,6 +121,24 @@ def refit(mesh: PolyMesh, target: RefitTarget, config: RefitConfig = DEFAULT) ->
 def refit_many(meshes: Iterable[PolyMesh], target: RefitTarget, config: RefitConfig = DEFAULT) -> list[RefitResult]:
     """`refit` of many meshes on all cores; the result does not depend on how many there are."""
     return map_threads(lambda mesh: refit(mesh, target, config), meshes)
+
+
+def _bound(shape: Shape, bonds: Bonds) -> Shape:
+    """The shape with its unknowns tied; of two mirror images the first leads."""
+    numbers = np.full(len(bonds.images), -1, np.int64)
+    numbers[shape.boundary] = np.arange(len(shape.boundary))
+    own = numbers[shape.boundary]
+    images = bonds.images[shape.boundary]
+    leader = np.where(images < 0, own, np.minimum(own, numbers[images]))
+    leader[bonds.locked[shape.boundary]] = -1
+    free = [k for k, v in enumerate(shape.inner) if not bonds.locked[v]]
+    parts = [shape.neighbours[shape.neighbour_offsets[k] : shape.neighbour_offsets[k + 1]] for k in free]
+    return shape._replace(
+        inner=shape.inner[free],
+        neighbours=np.concatenate([*parts, np.empty(0, np.int64)]),
+        neighbour_offsets=np.cumsum([0, *map(len, parts)]),
+        ties=Ties(leader, images == shape.boundary, float(bonds.axis)),
+    )
 
 
 @lru_cache(maxsize=4096)

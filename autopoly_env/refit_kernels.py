@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from autopoly_env.arrays import FloatArray, IntArray
+from autopoly_env.arrays import BoolArray, FloatArray, IntArray
 from autopoly_env.derivative_kernels import half_gradient, normal_equations
 from autopoly_env.geometry_kernels import count_crossings, face_areas
 from autopoly_env.jit import kernel
@@ -19,6 +19,14 @@ _MIN_FACE_AREA = 1e-9
 _FIRST_RATE, _LAST_RATE = 2.0 / 64.0, 0.1 / 64.0  # of the far phase, in unit-square lengths
 _IDLE_SHARE = 0.03  # of the steepest slope: below it the far phase slows down, or idle vertices would race along edges
 _MAX_MOVE = 4.0  # of a vertex in one step of the near phase, in pixels of the level
+
+
+class Ties(NamedTuple):
+    """What keeps unknowns from moving freely."""
+
+    leader: IntArray  # (N,) the unknown of which this one is the mirror image; itself where it is none, -1 where locked
+    on_axis: BoolArray  # (N,) the unknowns that stay on the axis
+    axis: float  # x of the axis
 
 
 class Shape(NamedTuple):
@@ -32,6 +40,7 @@ class Shape(NamedTuple):
     inner: IntArray  # (K,) vertices that are not on the boundary
     neighbours: IntArray  # vertices joined to each inner vertex, one after the other
     neighbour_offsets: IntArray  # (K+1,)
+    ties: Ties | None = None  # None where all unknowns are free: Numba then compiles a refit that knows of no ties
 
 
 class Picture(NamedTuple):
@@ -40,6 +49,7 @@ class Picture(NamedTuple):
     coverage: FloatArray  # (R, R)
     row_sum: FloatArray  # (R, R+1)
     row_square_sum: FloatArray  # (R, R+1)
+    weight_sum: FloatArray | None = None  # (R, R+1), see `derivative_kernels`
 
 
 class Settings(NamedTuple):
@@ -59,6 +69,67 @@ class Progress(NamedTuple):
 
     points: FloatArray  # (V, 2)
     record: FloatArray  # (6,) loss at the current level; crossings, flipped faces allowed; evaluations; box low, high
+
+
+@kernel
+def _obey(
+    ties: Ties | None, boundary: IntArray, start: FloatArray, low: float, high: float, unknowns: FloatArray
+) -> None:  # fmt: skip
+    """Put the unknowns that are tied where their ties want them: locked ones at their start, images opposite."""
+    if ties is None:
+        return
+    left, right = max(low, 2.0 * ties.axis - high), min(high, 2.0 * ties.axis - low)  # so that images stay inside
+    for n in range(unknowns.shape[0]):
+        leader = ties.leader[n]
+        if leader < 0:
+            unknowns[n, 0], unknowns[n, 1] = start[boundary[n], 0], start[boundary[n], 1]
+        elif ties.on_axis[n]:
+            unknowns[n, 0] = ties.axis
+        elif leader != n:
+            unknowns[leader, 0] = min(max(unknowns[leader, 0], left), right)
+            unknowns[n, 0] = 2.0 * ties.axis - unknowns[leader, 0]
+            unknowns[n, 1] = unknowns[leader, 1]
+
+
+@kernel
+def _tie_gradient(ties: Ties | None, gradient: FloatArray) -> None:
+    """Turn a gradient (N, 2) of free unknowns into that of the leading ones, 0 for those that do not lead."""
+    if ties is None:
+        return
+    for n in range(gradient.shape[0]):
+        leader = ties.leader[n]
+        if leader >= 0 and leader != n:
+            gradient[leader, 0] -= gradient[n, 0]
+            gradient[leader, 1] += gradient[n, 1]
+        if ties.on_axis[n]:
+            gradient[n, 0] = 0.0
+        if leader != n:
+            gradient[n, 0] = 0.0
+            gradient[n, 1] = 0.0
+
+
+@kernel
+def _tie_normal(ties: Ties | None, normal: FloatArray) -> None:
+    """The same for the lower triangle of J'J (2N, 2N): rows and columns of images are added to those of their leaders,
+    and all that do not lead become those of the unit matrix."""
+    if ties is None:
+        return
+    size = normal.shape[0]
+    for i in range(size):
+        for j in range(i):
+            normal[j, i] = normal[i, j]
+    for k in range(size):
+        n, axis = k >> 1, k & 1
+        leader = ties.leader[n]
+        if leader == n and not (axis == 0 and ties.on_axis[n]):
+            continue
+        if leader >= 0 and leader != n:
+            sign = -1.0 if axis == 0 else 1.0
+            normal[2 * leader + axis, :] += sign * normal[k, :]
+            normal[:, 2 * leader + axis] += sign * normal[:, k]
+        normal[k, :] = 0.0
+        normal[:, k] = 0.0
+        normal[k, k] = 1.0
 
 
 @kernel
@@ -110,7 +181,7 @@ def _offer(
 @kernel
 def _loss(unknowns: FloatArray, shape: Shape, picture: Picture, work: Workspace, gradient: FloatArray) -> float:
     """Sum of squared coverage errors; half its gradient per pixel goes into `gradient` (N, 2)."""
-    return half_gradient(
+    loss = half_gradient(
         unknowns,
         shape.loops,
         picture.coverage.shape[0],
@@ -119,7 +190,10 @@ def _loss(unknowns: FloatArray, shape: Shape, picture: Picture, work: Workspace,
         picture.row_square_sum,
         work,
         gradient,
+        picture.weight_sum,
     )
+    _tie_gradient(shape.ties, gradient)
+    return loss
 
 
 @kernel
@@ -155,6 +229,7 @@ def far_phase(
                 move = rate * mean[v, axis] / (1.0 - mean_left)
                 move /= np.sqrt(square[v, axis] / (1.0 - square_left)) + floor
                 unknowns[v, axis] = min(max(unknowns[v, axis] - move, low), high)
+        _obey(shape.ties, shape.boundary, start, low, high, unknowns)
         rate *= decay
 
 
@@ -208,10 +283,9 @@ def _normal_equations(
         work,
         gradient,
         normal,
+        picture.weight_sum,
     )
-    if stiffness == 0.0:
-        return loss
-    for e in range(shape.loops.shape[0]):
+    for e in range(shape.loops.shape[0] if stiffness != 0.0 else 0):
         i, j = shape.loops[e, 0], shape.loops[e, 1]
         for axis in range(2):
             change = unknowns[j, axis] - unknowns[i, axis] - origin[j, axis] + origin[i, axis]
@@ -222,6 +296,8 @@ def _normal_equations(
             normal[2 * i + axis, 2 * i + axis] += stiffness
             normal[2 * j + axis, 2 * j + axis] += stiffness
             normal[2 * max(i, j) + axis, 2 * min(i, j) + axis] -= stiffness
+    _tie_gradient(shape.ties, gradient)
+    _tie_normal(shape.ties, normal)
     return loss
 
 
@@ -261,6 +337,7 @@ def near_phase(
         for v in range(n):
             candidate[v, 0] = min(max(unknowns[v, 0] + scale * move[2 * v], low), high)
             candidate[v, 1] = min(max(unknowns[v, 1] + scale * move[2 * v + 1], low), high)
+        _obey(shape.ties, shape.boundary, start, low, high, candidate)
         next_loss = _normal_equations(origin, candidate, shape, picture, stiffness, work, next_gradient, next_normal)
         if next_loss < loss:
             sane = _offer(start, candidate, shape, next_loss, trial, best)
@@ -299,6 +376,7 @@ def _restore_idle(
         unknowns[k, 1] = source[v, 1]
     if idle == 0:
         return
+    _obey(shape.ties, shape.boundary, start, best.record[4], best.record[5], unknowns)
     loss = _loss(unknowns, shape, picture, work, np.empty((n, 2)))
     allowed = best.record[0] * 1.001 + 1e-3
     if loss <= allowed:

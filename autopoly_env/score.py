@@ -52,11 +52,14 @@ def score(mesh: PolyMesh, target: Target, weights: ScoreWeights) -> Score:
 
 
 def intersection_over_union(mesh: PolyMesh, target: Target) -> float:
-    """IoU, 0 to 1, of the pixels that the mesh covers by half or more and the target's mask."""
+    """IoU, 0 to 1, of the pixels that the mesh covers by half or more and the target's mask.
+
+    Where the target has weights: those of the intersection over those of the union, both summed exactly.
+    """
     edges = mesh.topology.boundary_half_edges
     work = workspace(target.resolution, len(edges))
     inside, filled = raster_kernels.overlap_counts(
-        mesh.vertices, edges, target.resolution, target.mask, target.mask_sum, work
+        mesh.vertices, edges, target.resolution, target.mask, target.mask_sum, work, target.weight_sum
     )
     union = filled + target.n_filled - inside
     return float(inside / union) if union else 1.0

@@ -17,6 +17,7 @@ __all__ = ["ImageSource", "Silhouette", "Target", "find_images", "load_silhouett
 BoolArray = npt.NDArray[np.bool_]
 IntArray = npt.NDArray[np.int64]
 FloatArray = npt.NDArray[np.float64]
+WEIGHT_STEPS = 2**20  # of a weight of 1
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -30,14 +31,20 @@ class Target:
     - `row_sum`, `row_square_sum` (R, R+1) float64: prefix sums along the rows of coverage and of its square,
       from 0, so that `row_sum[y, b] - row_sum[y, a]` is the sum over the columns a..b-1.
     - `mask_sum` (R, R+1) int64: the same of `mask`; `n_filled`: how many cells of it are set.
+
+    Where cells are not all worth the same, `weights` (R, R) >= 0 say so, rounded to multiples of 2**-20: sums of them
+    are then exact. `weight_sum` (R, R+1) are their prefix sums, None without, and each sum above (`mask_sum` and
+    `n_filled` as float64) counts every cell times its weight.
     """
 
     coverage: FloatArray
+    weights: FloatArray | None = None
     mask: BoolArray = field(init=False)
     row_sum: FloatArray = field(init=False)
     row_square_sum: FloatArray = field(init=False)
-    mask_sum: IntArray = field(init=False)
-    n_filled: int = field(init=False)
+    mask_sum: IntArray | FloatArray = field(init=False)
+    n_filled: float = field(init=False)
+    weight_sum: FloatArray | None = field(init=False)
 
     def __post_init__(self) -> None:
         coverage = np.array(self.coverage, dtype=np.float64, order="C")
@@ -46,10 +53,17 @@ class Target:
         mask = coverage >= 0.5
         object.__setattr__(self, "coverage", _read_only(coverage))
         object.__setattr__(self, "mask", _read_only(mask))
-        object.__setattr__(self, "row_sum", _row_prefix_sums(coverage))
-        object.__setattr__(self, "row_square_sum", _row_prefix_sums(coverage**2))
-        object.__setattr__(self, "mask_sum", _row_prefix_sums(mask.astype(np.int64)))
-        object.__setattr__(self, "n_filled", int(mask.sum()))
+        weights = None if self.weights is None else _read_only(np.rint(self.weights * WEIGHT_STEPS) / WEIGHT_STEPS)
+
+        def weighed(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+            return values if weights is None else values * weights
+
+        object.__setattr__(self, "weights", weights)
+        object.__setattr__(self, "weight_sum", None if weights is None else _row_prefix_sums(weights))
+        object.__setattr__(self, "row_sum", _row_prefix_sums(weighed(coverage)))
+        object.__setattr__(self, "row_square_sum", _row_prefix_sums(weighed(coverage**2)))
+        object.__setattr__(self, "mask_sum", _row_prefix_sums(weighed(mask.astype(np.int64))))
+        object.__setattr__(self, "n_filled", weighed(mask.astype(np.int64)).sum().item())
 
     @property
     def resolution(self) -> int:
@@ -60,7 +74,7 @@ class Target:
         return f"Target(resolution={self.resolution})"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Target, (self.coverage,)  # so that an unpickled one is read-only as well
+        return Target, (self.coverage, self.weights)  # so that an unpickled one is read-only as well
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +82,9 @@ class Silhouette:
     """A target shape: `mask` (R, R) bool, True is object, at the image's own resolution R; read-only.
 
     It fills the unit square, x right, y down. `notes` has a short sentence for everything that loading did or
-    noticed; those that begin with "warning:" deserve to be shown.
+    noticed; those that begin with "warning:" deserve to be shown. `picture_shape` (H, W) is what the image had before
+    it was padded to a square, (R, R) by default. `weights` (R, R) in 0..1 say where matching matters, None: everywhere
+    alike; `autopoly_env.importance.weighted` reads them from an image.
 
     Raises SilhouetteError for a mask that is not boolean, not square or without any object.
     """
@@ -76,6 +92,8 @@ class Silhouette:
     mask: BoolArray = field(repr=False)
     name: str = "silhouette"
     notes: tuple[str, ...] = ()
+    picture_shape: tuple[int, int] | None = field(default=None, repr=False)
+    weights: FloatArray | None = field(default=None, repr=False)
     _targets: dict[int, Target] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -102,7 +120,8 @@ class Silhouette:
         if resolution < 1:
             raise ConfigError(f"target resolution {resolution} is too small; expected at least 1: raise it")
         if resolution not in self._targets:
-            self._targets[resolution] = Target(_area_average(self.mask, resolution))
+            weights = None if self.weights is None else area_means(self.weights, (resolution, resolution))
+            self._targets[resolution] = Target(_area_average(self.mask, resolution), weights)
         return self._targets[resolution]
 
     def pyramid(self, levels: Sequence[int]) -> tuple[Target, ...]:
@@ -110,7 +129,8 @@ class Silhouette:
         return tuple(self.target(resolution) for resolution in levels)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Silhouette, (self.mask, self.name, self.notes)  # without the targets: cheaper made than sent
+        given = (self.mask, self.name, self.notes, self.picture_shape, self.weights)
+        return Silhouette, given  # without the targets: cheaper made than sent
 
 
 def load_silhouette(source: ImageSource, *, name: str | None = None, min_component: int | None = None) -> Silhouette:
@@ -135,9 +155,10 @@ def load_silhouette(source: ImageSource, *, name: str | None = None, min_compone
     mask, how_found = object_mask.find_object(picture)
     mask, how_cleaned = object_mask.clean(mask, min_component)
     look = object_mask.describe(mask)
+    shape = mask.shape
     mask, how_padded = object_mask.square(mask)
     notes = (*picture.notes, *how_found, *how_cleaned, *look, *how_padded)
-    return Silhouette(mask, picture.name if name is None else name, notes)
+    return Silhouette(mask, picture.name if name is None else name, notes, (shape[0], shape[1]))
 
 
 def _area_average(mask: BoolArray, resolution: int) -> FloatArray:
@@ -148,6 +169,17 @@ def _area_average(mask: BoolArray, resolution: int) -> FloatArray:
     """
     by_row = _cell_sums(mask.astype(np.int64), resolution)
     return _cell_sums(by_row.T, resolution).T / mask.size
+
+
+def area_means(values: FloatArray, shape: tuple[int, int]) -> FloatArray:
+    """Means of an image (H, W) over equal cells, as many as `shape` says; a cell may be smaller than a pixel."""
+    for axis, n in enumerate(shape):
+        size = values.shape[axis]
+        prefix = np.concatenate((np.zeros_like(values.take([0], axis)), np.cumsum(values, axis)), axis)
+        whole, rest = np.divmod(np.arange(n + 1) * size, n)  # the borders of the cells, in pixels
+        begun = values.take(np.minimum(whole, size - 1), axis) * np.expand_dims(rest / n, 1 - axis)
+        values = np.diff(prefix.take(whole, axis) + begun, axis=axis) * (n / size)
+    return values
 
 
 def _cell_sums(values: IntArray, resolution: int) -> IntArray:

@@ -4,7 +4,7 @@ A step is S' = S . t . g (paper, section 3.4): a topological action t, then g, t
 refit to the target finds. States are immutable values; a simulator draws no random numbers.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import Any
@@ -15,13 +15,17 @@ import shapely
 from autopoly_env.actions import STOP, Action, legal_actions
 from autopoly_env.edits import Choice
 from autopoly_env.errors import ConfigError, IllegalActionError
+from autopoly_env.guidance import Guidance, importance_settings
+from autopoly_env.importance import ImportanceSource, weighted
 from autopoly_env.mesh import PolyMesh
+from autopoly_env.mirror import Beginning, Halfway, mirrored_starts
 from autopoly_env.operators import preset
 from autopoly_env.parallel import map_threads
-from autopoly_env.placement import Disagreement, Start, defects_of, leaves_outline_alone, starts
+from autopoly_env.placement import Disagreement, defects_of, leaves_outline_alone, starts
 from autopoly_env.refit import FROM_AFAR, LOCAL, THOROUGH, RefitConfig, RefitTarget, refit
 from autopoly_env.routines import Job, Routine, run
 from autopoly_env.score import Score, ScoreWeights, score
+from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import Silhouette
 
 POLISH_RESOLUTION = 512  # of the finest refit; a score may be finer
@@ -38,6 +42,11 @@ class State:
     action: Action | None = None  # what made it, None for an initial state
     choice: Choice | None = None  # what was left free by the action
     n_refits: int = 1  # refits that the step took
+    halfway: Halfway | None = None  # before the mirror image of the action, where that came with it
+
+    def _repr_svg_(self) -> str:
+        """The mesh as a drawing, for notebooks."""
+        return self.mesh._repr_svg_()
 
 
 class Simulator:
@@ -45,7 +54,13 @@ class Simulator:
 
     Parameters: `silhouette`, the target; `operators`, a preset or names ("paper", "full", "edge_subdivide,..."); the
     `resolution` R at which states are refitted and scored, in pixels; `weights` of the score; the game ends at
-    `max_steps` and where the IoU reaches `match_threshold`. Raises ConfigError for settings out of range.
+    `max_steps` and where the IoU reaches `match_threshold`.
+
+    A user may guide the construction (docs/guidance.md): `importance`, an image that says where matching matters;
+    `start`, the mesh to begin with, or a sequence to go on from; `locked`, ids of its vertices that are neither moved
+    nor removed; `symmetry` about a vertical axis, x in 0..1, or True for the axis that suits the silhouette best.
+
+    Raises ConfigError for settings that are out of range or contradict each other.
     """
 
     def __init__(
@@ -57,6 +72,10 @@ class Simulator:
         weights: ScoreWeights | None = None,
         max_steps: int = 100,
         match_threshold: float = 1.0,
+        importance: ImportanceSource | None = None,
+        start: PolyMesh | ConstructionSequence | None = None,
+        locked: Collection[int] = (),
+        symmetry: bool | float | None = None,
     ) -> None:
         if not 8 <= resolution <= 1024:
             raise ConfigError(f"resolution {resolution}: expected 8 to 1024 pixels a side")
@@ -64,14 +83,15 @@ class Simulator:
             raise ConfigError(f"max_steps {max_steps}: expected at least 0")
         if not 0.0 < match_threshold <= 1.0:
             raise ConfigError(f"match_threshold {match_threshold}: expected an IoU above 0, at most 1")
-        self.silhouette = silhouette
+        self.silhouette = silhouette if importance is None else weighted(silhouette, importance)
+        self.guidance = Guidance.of(self.silhouette, start, locked, symmetry)
         self.operators = tuple(operator.name for operator in preset(operators))
         self.resolution = resolution
         self.weights = weights or ScoreWeights()
         self.max_steps = max_steps
         self.match_threshold = match_threshold
-        self._target = silhouette.target(resolution)
-        self._refit_target = RefitTarget.of(silhouette, resolution)
+        self._target = self.silhouette.target(resolution)
+        self._refit_target = RefitTarget.of(self.silhouette, resolution)
 
     def settings(self) -> dict[str, Any]:
         """The rules as plain values, as a construction sequence keeps them."""
@@ -82,27 +102,41 @@ class Simulator:
             "max_steps": self.max_steps,
             "match_threshold": self.match_threshold,
             **asdict(self.weights),
+            **importance_settings(self.silhouette),
+            **self.guidance.settings(),
         }
 
     def initial(self, mesh: PolyMesh | None = None) -> State:
-        """The state before the first action: `mesh` as it is, or the better of two refitted rectangles.
+        """The state before the first action: `mesh` or the start mesh as it is, or the better of two refitted boxes.
 
-        The rectangles are the upright and the smallest bounding box of the target.
+        These are the upright and the smallest bounding box of the target; under symmetry there is one, upright and
+        centred on the axis. Raises ConfigError for a mesh that is not symmetric where it has to be.
         """
         return run(self.initial_routine(mesh))
 
     def initial_routine(self, mesh: PolyMesh | None = None) -> Routine[State]:
         """`initial` as a routine, whose jobs are the refits."""
+        mesh = self.guidance.start if mesh is None else mesh
         if mesh is not None:
+            self.guidance.check_symmetric(mesh)
             return self._ended(State(mesh, self.score(mesh), n_refits=0))
         fits = yield [self._refit_job(box, FROM_AFAR) for box in self._bounding_boxes()]
         best = max((fit.mesh for fit in fits), key=lambda fit: self.score(fit).total)
         return self._ended(State(best, self.score(best), n_refits=len(fits)))
 
     def _bounding_boxes(self) -> Iterator[PolyMesh]:
-        rows, columns = np.nonzero(self._target.mask if self._target.mask.any() else self._target.coverage > 0.0)
+        target = self._target
+        rows, columns = np.nonzero(target.mask if target.mask.any() else target.coverage > 0.0)
+        if target.weights is not None and target.weights[rows, columns].any():  # of what matters at all
+            matters = target.weights[rows, columns] > 0.0
+            rows, columns = rows[matters], columns[matters]
         x0, x1 = columns.min() / self.resolution, (columns.max() + 1) / self.resolution
         y0, y1 = rows.min() / self.resolution, (rows.max() + 1) / self.resolution
+        axis = self.guidance.axis
+        if axis is not None:
+            half = min(max(0.5 * (x1 - x0), x0 - axis, axis - x1), axis, 1.0 - axis)
+            yield PolyMesh.rectangle(axis - half, y0, axis + half, y1)
+            return
         yield PolyMesh.rectangle(x0, y0, x1, y1)
         at_row_end = (np.diff(rows, prepend=-1) != 0) | (np.diff(rows, append=-1) != 0)  # these have the same hull
         centres = np.column_stack((columns, rows))[at_row_end] + 0.5
@@ -123,7 +157,13 @@ class Simulator:
 
     def legal_actions(self, state: State) -> list[Action]:
         """What may be done next; STOP first, and nothing once it is over."""
-        return [] if state.done else [STOP, *legal_actions(state.mesh, self.operators)]
+        if state.done:
+            return []
+        actions = [a for a in legal_actions(state.mesh, self.operators) if self.guidance.allows(state.mesh, a)]
+        if self.guidance.axis is not None:  # only trying tells whether there is room for a mirror image
+            disagreement = Disagreement(state.mesh, self.silhouette)
+            actions = [action for action, _ in self._possible(disagreement, actions)]
+        return [STOP, *actions]
 
     def transition(self, state: State, action: Action) -> State:
         """The state after one action and its refit. Raises IllegalActionError where the action is not legal."""
@@ -134,14 +174,14 @@ class Simulator:
         if state.done:
             raise IllegalActionError(f"the construction has ended ({state.done}): start from an earlier state")
         if action == STOP:
-            return replace(state, done="stop", action=STOP, choice=None, n_refits=0)
+            return replace(state, done="stop", action=STOP, choice=None, n_refits=0, halfway=None)
         self._check_operator(action)
-        begin = starts(Disagreement(state.mesh, self.silhouette), action)
+        begin = self._begin(Disagreement(state.mesh, self.silhouette), action)
         return (yield from self._refitted(state, action, begin))
 
     def idle(self, state: State) -> State:
         """The state one step later, nothing done: what a player that asks for an illegal action gets."""
-        return self._ended(replace(state, step=state.step + 1, action=None, choice=None, n_refits=0))
+        return self._ended(replace(state, step=state.step + 1, action=None, choice=None, n_refits=0, halfway=None))
 
     def transition_all(self, state: State, actions: Sequence[Action] | None = None) -> list[State]:
         """`transition` of all (or the given) actions but STOP, on all cores, in their order.
@@ -156,27 +196,46 @@ class Simulator:
             if action != STOP:
                 self._check_operator(action)
         disagreement = Disagreement(state.mesh, self.silhouette)
-        jobs = _possible_starts(disagreement, [action for action in chosen if action != STOP])
+        jobs = self._possible(disagreement, [action for action in chosen if action != STOP])
         return map_threads(lambda job: run(self._refitted(state, *job)), jobs)
 
     def _check_operator(self, action: Action) -> None:
         if action.operator not in self.operators:
             raise IllegalActionError(f"{action.operator!r} is not one of this simulator's operators: {self.operators}")
 
-    def _refitted(self, state: State, action: Action, begin: list[Start]) -> Routine[State]:
+    def _begin(self, disagreement: Disagreement, action: Action) -> list[Beginning]:
+        """The meshes from which to refit after an action. Raises IllegalActionError where it is not legal."""
+        if self.guidance.axis is not None:
+            begin = mirrored_starts(disagreement, action, self.guidance.axis)
+        else:
+            begin = [(choice, mesh, None) for choice, mesh in starts(disagreement, action)]
+        self.guidance.check_locks(disagreement.mesh, action, begin[0][1])
+        return begin
+
+    def _possible(
+        self, disagreement: Disagreement, actions: Sequence[Action]
+    ) -> Iterator[tuple[Action, list[Beginning]]]:
+        """The actions that are legal after all, and where they begin."""
+        for action in actions:
+            try:
+                yield action, self._begin(disagreement, action)
+            except IllegalActionError:
+                continue
+
+    def _refitted(self, state: State, action: Action, begin: list[Beginning]) -> Routine[State]:
         """The refit with the fewest crossings and flipped faces, and of those the best, from the given starts."""
         if leaves_outline_alone(state.mesh, action):
-            choice, mesh = begin[0]
+            choice, mesh, halfway = begin[0]
             n_refits = 0
         else:
-            fits = yield [self._refit_job(mesh, THOROUGH) for _, mesh in begin]
+            fits = yield [self._refit_job(mesh, THOROUGH) for _, mesh, _ in begin]
             k = min(range(len(fits)), key=lambda k: (sum(defects_of(fits[k].mesh)), fits[k].loss))
-            choice, mesh, n_refits = begin[k][0], fits[k].mesh, len(fits)
-        after = State(mesh, self.score(mesh), state.step + 1, "", action, choice, n_refits)
+            (choice, _, halfway), mesh, n_refits = begin[k], fits[k].mesh, len(fits)
+        after = State(mesh, self.score(mesh), state.step + 1, "", action, choice, n_refits, halfway)
         return self._ended(after)
 
     def _refit_job(self, mesh: PolyMesh, config: RefitConfig) -> Job:
-        return partial(refit, mesh, self._refit_target, config)
+        return partial(refit, mesh, self._refit_target, config, self.guidance.bonds(mesh))
 
     def _ended(self, state: State) -> State:
         """The state with its end marked, if this is one."""
@@ -189,13 +248,5 @@ class Simulator:
     def polish(self, mesh: PolyMesh) -> PolyMesh:
         """The mesh refitted at the silhouette's own resolution (at most `POLISH_RESOLUTION`), if that scores better."""
         size = min(self.silhouette.resolution, POLISH_RESOLUTION)
-        fitted = refit(mesh, RefitTarget.of(self.silhouette, size), LOCAL).mesh
+        fitted = refit(mesh, RefitTarget.of(self.silhouette, size), LOCAL, self.guidance.bonds(mesh)).mesh
         return max((mesh, fitted), key=lambda candidate: self.final_score(candidate).total)
-
-
-def _possible_starts(disagreement: Disagreement, actions: Sequence[Action]) -> Iterator[tuple[Action, list[Start]]]:
-    for action in actions:
-        try:
-            yield action, starts(disagreement, action)
-        except IllegalActionError:
-            continue

@@ -1,5 +1,9 @@
-"""Wavefront OBJ: the mesh as other modelling programs read it, n-gons and all."""
+"""Wavefront OBJ: the mesh as other modelling programs read and write it, n-gons and all."""
 
+import os
+from pathlib import Path
+
+from autopoly_env.errors import MeshError
 from autopoly_env.mesh import PolyMesh
 
 
@@ -24,3 +28,56 @@ def to_obj(mesh: PolyMesh) -> str:
     for first, *others in mesh.faces:
         lines.append(" ".join(["f", *(str(v + 1) for v in (first, *reversed(others)))]))
     return "\n".join(lines) + "\n"
+
+
+def from_obj(text: str) -> PolyMesh:
+    """The mesh in OBJ text, as `to_obj` writes it: seen from +z, y up, z left out; vertex ids are 0, 1, ... in order.
+
+    Read are `v` and `f` lines, of a corner such as `3/1/2` the vertex only; all others are passed over. Faces may be
+    wound either way, as long as all are wound alike. Raises MeshError naming the line that is wrong, or for what
+    is no valid mesh.
+
+    >>> from_obj("v 0 0 0\\nv 1 0 0\\nv 1 1 0\\nf 1 2 3").faces
+    ((0, 2, 1),)
+    """
+    points: list[tuple[float, float]] = []
+    faces: list[tuple[int, ...]] = []
+    for number, line in enumerate(text.replace("\\\n", " ").splitlines(), 1):
+        word, *values = line.split("#", 1)[0].split() or [""]
+        try:
+            if word == "v":
+                if len(values) < 3:
+                    raise ValueError("expected v x y z")
+                points.append((float(values[0]), 1.0 - float(values[1])))
+            elif word == "f":
+                if len(values) < 3:
+                    raise ValueError("expected a face of at least 3 corners")
+                faces.append(tuple(_vertex(value, len(points)) for value in values))
+        except ValueError as error:
+            raise MeshError(f"line {number} of the OBJ text, {line.strip()[:40]!r}: {error}") from None
+    if not points or not faces:
+        raise MeshError(f"the OBJ text has {len(points)} vertices and {len(faces)} faces; expected v and f lines")
+    backwards = [(first, *reversed(others)) for first, *others in faces]
+    mesh = PolyMesh.from_faces(points, backwards)
+    return mesh if (mesh.face_areas() > 0.0).any() else PolyMesh.from_faces(points, faces)
+
+
+def load_obj(path: str | os.PathLike[str]) -> PolyMesh:
+    """The mesh in an OBJ file. Raises MeshError as `from_obj`, or if the file cannot be read."""
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "not text"
+        raise MeshError(f"cannot read {path} ({reason}); give an OBJ file") from None
+    try:
+        return from_obj(text)
+    except MeshError as error:
+        raise MeshError(f"{path}: {error}") from None
+
+
+def _vertex(corner: str, n_vertices: int) -> int:
+    """The index, from 0, of a corner's vertex; a negative number counts from the last vertex so far."""
+    number = int(corner.split("/", 1)[0])
+    if not 1 <= abs(number) <= n_vertices:
+        raise ValueError(f"vertex {number} is not among the {n_vertices} so far")
+    return number - 1 if number > 0 else n_vertices + number

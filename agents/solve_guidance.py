@@ -1,0 +1,76 @@
+"""What `agents.solve` is told of the way to build: its files are read, and its words understood, before the work."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from autopoly_env.arrays import FloatArray
+from autopoly_env.errors import AutoPolyError, ConfigError
+from autopoly_env.export import load_obj
+from autopoly_env.importance import read_importance
+from autopoly_env.mesh import PolyMesh
+from autopoly_env.sequence import ConstructionSequence
+
+
+@dataclass(frozen=True, eq=False)
+class Wishes:
+    """The options of the command; see `Simulator` for what they do."""
+
+    importance: FloatArray | None = None  # (H, W), 0 to 1
+    start: PolyMesh | ConstructionSequence | None = None
+    locked: tuple[int, ...] = ()
+    symmetry: bool | float | None = None
+    files: dict[str, str] = field(default_factory=dict)  # by option, where it came from
+
+    def for_simulator(self) -> dict[str, Any]:
+        """Arguments of `Simulator`."""
+        return {
+            "importance": self.importance,
+            "start": self.start,
+            "locked": self.locked,
+            "symmetry": self.symmetry,
+        }
+
+
+NO_WISHES = Wishes()
+
+
+def read_wishes(importance: Path | None, start: Path | None, lock: str | None, symmetry: str | None) -> Wishes:
+    """The wishes behind the options as they were typed. Raises ConfigError that names the option that is wrong."""
+    levels = None if importance is None else read_importance(importance)
+    mesh = None if start is None else _read_start(start)
+    files = {"importance": importance, "start": start}
+    return Wishes(levels, mesh, _ids(lock), _axis(symmetry), {k: str(path) for k, path in files.items() if path})
+
+
+def _read_start(path: Path) -> PolyMesh | ConstructionSequence:
+    try:
+        match path.suffix.lower():
+            case ".obj":
+                return load_obj(path)
+            case ".json":
+                return ConstructionSequence.load(path)
+    except AutoPolyError as error:
+        raise ConfigError(f"--start: {error}") from None
+    raise ConfigError(f"--start {path}: expected a mesh (.obj) or a construction sequence (.json)")
+
+
+def _ids(text: str | None) -> tuple[int, ...]:
+    try:
+        ids = [] if text is None else [int(word) for word in text.split(",")]
+    except ValueError:
+        ids = [-1]
+    if any(name < 0 for name in ids):
+        raise ConfigError(f"--lock {text}: expected ids of vertices with commas between them, such as 0,3,5")
+    return tuple(dict.fromkeys(ids))
+
+
+def _axis(text: str | None) -> bool | float | None:
+    if text is None:
+        return None
+    if text == "auto":
+        return True
+    try:
+        return float(text)
+    except ValueError:
+        raise ConfigError(f"--symmetry {text}: expected auto, or the x of the axis, 0 to 1") from None

@@ -1,0 +1,173 @@
+"""`Guidance`: what a user may ask of a construction - a mesh to start from, vertices to leave alone, symmetry.
+
+(The fourth wish, where matching matters, is a property of the silhouette: see `importance`.)
+"""
+
+import hashlib
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from autopoly_env.actions import Action, describe
+from autopoly_env.errors import ConfigError, IllegalActionError, MeshError
+from autopoly_env.mesh import PolyMesh, canonical_hash, validate
+from autopoly_env.operators import OPERATORS
+from autopoly_env.placement import defects_of
+from autopoly_env.refit import Bonds
+from autopoly_env.sequence import ConstructionSequence
+from autopoly_env.silhouette import Silhouette
+from autopoly_env.symmetry import best_axis, images_of
+
+_LEAST_ROOM = 1 / 64  # beside an axis, in the unit square
+
+
+@dataclass(frozen=True, eq=False)
+class Guidance:
+    """Wishes that have been checked; `of` checks them."""
+
+    start: PolyMesh | None = None
+    earlier: ConstructionSequence | None = None  # what led to `start`, if it was given
+    locked: frozenset[int] = frozenset()  # ids of vertices that stay, and stay where they are
+    axis: float | None = None  # x of the axis about which the outline is symmetric
+
+    @classmethod
+    def of(
+        cls,
+        silhouette: Silhouette,
+        start: PolyMesh | ConstructionSequence | None,
+        locked: Collection[int],
+        symmetry: bool | float | None,
+    ) -> "Guidance":
+        """See `Simulator` for the arguments. Raises ConfigError for what is impossible or contradicts itself."""
+        earlier, mesh = (start, start.final()) if isinstance(start, ConstructionSequence) else (None, start)
+        if mesh is not None:
+            _check_start(mesh)
+        _check_locked(mesh, locked)
+        axis = None if symmetry is None or symmetry is False else _axis(silhouette, symmetry)
+        guidance = cls(mesh, earlier, frozenset(map(int, locked)), axis)
+        if mesh is not None and axis is not None:
+            guidance.check_symmetric(mesh)
+            _check_images_locked(mesh, guidance.locked, axis)
+        return guidance
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The wishes there are: some of start, locked and symmetry."""
+        wishes = {"start": self.start is not None, "locked": bool(self.locked), "symmetry": self.axis is not None}
+        return tuple(name for name, is_given in wishes.items() if is_given)
+
+    def settings(self) -> dict[str, Any]:
+        """The wishes as plain values, as a construction sequence keeps them; those that there are."""
+        values: dict[str, Any] = {}
+        if self.start is not None:
+            values["start"] = canonical_hash(self.start)
+        if self.earlier is not None:
+            values["earlier_steps"] = len(self.earlier.steps)
+        if self.locked:
+            values["locked"] = sorted(self.locked)
+        if self.axis is not None:
+            values["symmetry"] = self.axis
+        return values
+
+    def bonds(self, mesh: PolyMesh) -> Bonds | None:
+        """What a refit of the mesh has to heed; None if it is free."""
+        if not self.locked and self.axis is None:
+            return None
+        locked = np.array([name in self.locked for name in mesh.vertex_ids], np.bool_)
+        if self.axis is None:
+            return Bonds(locked, np.full(len(locked), -1, np.int64))
+        images = images_of(mesh, self.axis)
+        if images is None:
+            raise self._unsymmetric("the mesh")
+        return Bonds(locked, images, self.axis)
+
+    def check_symmetric(self, mesh: PolyMesh) -> None:
+        """Raise ConfigError if symmetry is wished for and the outline has none."""
+        if self.axis is not None and images_of(mesh, self.axis) is None:
+            raise self._unsymmetric("the start mesh")
+
+    def _unsymmetric(self, what: str) -> ConfigError:
+        return ConfigError(
+            f"the outline of {what} is not symmetric about x = {self.axis:g}: mirror it, or give another axis or none"
+        )
+
+    def check_locks(self, before: PolyMesh, action: Action, after: PolyMesh) -> None:
+        """Raise IllegalActionError if a locked vertex is gone after the action."""
+        gone = self.locked.intersection(before.vertex_ids).difference(after.vertex_ids)
+        if gone:
+            raise IllegalActionError(
+                f"{describe(before, action)} would remove vertex {min(gone)}, which is locked; choose another action"
+            )
+
+    def allows(self, mesh: PolyMesh, action: Action) -> bool:
+        """Whether a legal action spares the locked vertices."""
+        operator = OPERATORS[action.operator]
+        if not self.locked or min(map(min, operator.changes)) >= 0:
+            return True
+        return self.locked.intersection(mesh.vertex_ids) <= set(operator.apply(mesh, action.element).vertex_ids)
+
+
+def importance_settings(silhouette: Silhouette) -> dict[str, Any]:
+    """A hash of the weights of a silhouette as a setting; nothing if it has none."""
+    if silhouette.weights is None:
+        return {}
+    digest = hashlib.blake2b(silhouette.weights.astype("<f8").tobytes(), digest_size=16)
+    return {"importance": digest.hexdigest()}
+
+
+def continued(
+    earlier: ConstructionSequence, later: ConstructionSequence, scores: list[dict[str, float]]
+) -> ConstructionSequence:
+    """The steps of `earlier`, rescored (`scores` of its start and of each step), followed by those of `later`."""
+    steps = tuple(replace(step, score=score) for step, score in zip(earlier.steps, scores[1:], strict=True))
+    return replace(earlier, settings=later.settings, start_score=scores[0], steps=(*steps, *later.steps))
+
+
+def _check_start(mesh: PolyMesh) -> None:
+    if not isinstance(mesh, PolyMesh):
+        kind = type(mesh).__name__
+        raise ConfigError(f"the start is a {kind}; expected a PolyMesh or a ConstructionSequence")
+    try:
+        validate(mesh)
+    except MeshError as error:
+        raise ConfigError(f"the start mesh is not valid: {error}") from None
+    outside = np.flatnonzero(((mesh.vertices < 0.0) | (mesh.vertices > 1.0)).any(axis=1))
+    if len(outside):
+        name, (x, y) = mesh.vertex_ids[outside[0]], mesh.vertices[outside[0]]
+        raise ConfigError(f"vertex {name} of the start mesh is at ({x:g}, {y:g}), outside the unit square: scale it in")
+    crossings, flipped = defects_of(mesh)
+    if crossings:
+        raise ConfigError(f"the start mesh has {crossings} pairs of edges that cross or touch: pull them apart")
+    if flipped:
+        raise ConfigError(f"the start mesh has {flipped} flipped or empty faces: turn them over or leave them out")
+
+
+def _check_locked(mesh: PolyMesh | None, locked: Collection[int]) -> None:
+    if not locked:
+        return
+    if mesh is None:
+        raise ConfigError(f"locked vertices {sorted(locked)} but no start mesh: give the mesh that has these ids")
+    unknown = sorted(set(locked).difference(mesh.vertex_ids))
+    if unknown:
+        ids = ", ".join(map(str, mesh.vertex_ids[:12])) + (", ..." if len(mesh.vertex_ids) > 12 else "")
+        raise ConfigError(f"locked vertex {unknown[0]} is not in the start mesh: its ids are {ids}")
+
+
+def _axis(silhouette: Silhouette, symmetry: bool | float) -> float:
+    axis = best_axis(silhouette) if symmetry is True else float(symmetry)
+    if not _LEAST_ROOM <= axis <= 1.0 - _LEAST_ROOM:
+        raise ConfigError(f"symmetry about x = {axis:g}: expected an axis well inside the unit square, such as 0.5")
+    return axis
+
+
+def _check_images_locked(mesh: PolyMesh, locked: frozenset[int], axis: float) -> None:
+    images = images_of(mesh, axis)
+    assert images is not None
+    for name in sorted(locked):
+        image = int(images[mesh.vertex_index(name)])
+        if image >= 0 and mesh.vertex_ids[image] not in locked:
+            raise ConfigError(
+                f"vertex {name} is locked, its mirror image {mesh.vertex_ids[image]} is not: lock both or neither"
+            )
