@@ -22,12 +22,20 @@ Examples:
   python -m agents.solve chair.png mug.png --agent greedy --operators paper
   python -m agents.solve chair.png --agent beam --option width=4 --refits 5000
   python -m agents.solve 'shapes/**/*.png' --json --quiet > scores.jsonl
+  python -m agents.solve mug.png --importance face.png
+  python -m agents.solve mug.png --agent beam --start mug.obj --lock 0,3
+  python -m agents.solve vase.png --agent beam --symmetry auto
 
 \b
 For every image, OUT/<name of the file without its ending>/ gets
   sequence.json  the actions, to be replayed    mesh.obj  the mesh, y up
   steps.png      every step over the target     mesh.svg  the mesh, to edit
+  player.html    the construction, to be watched and done by hand in Blender
 and OUT/overview.png shows all meshes, if there are several images.
+
+\b
+Guidance (docs/guidance.md): --importance is for every agent; --start, --lock
+and --symmetry are for those that play step by step: beam, greedy, random, mcts.
 
 \b
 Printed are the scores, at each image's own resolution, and the picture to open:
@@ -49,7 +57,8 @@ def solve(
     agent: Annotated[
         str,
         typer.Option(
-            help="Who builds: climb, trace, mcts, mcts_paper, decimate, beam, greedy, random, dr-simple or dr-complex."
+            help="Who builds: climb, trace, mcts, mcts_paper, nfap-prior, nfap-mcts, decimate, beam, greedy, random, "
+            "dr-simple or dr-complex."
         ),
     ] = DEFAULT_AGENT,
     operators: Annotated[str, typer.Option(help="paper, full, or operators, separated by commas.")] = "full",
@@ -67,6 +76,19 @@ def solve(
     option: Annotated[
         list[str] | None, typer.Option(metavar="KEY=VALUE", help="An option of the agent; may be repeated.")
     ] = None,
+    importance: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Grey picture: white where matching matters, black where not.")
+    ] = None,
+    start: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Mesh (.obj) to start from, or sequence (.json) to go on from.")
+    ] = None,
+    lock: Annotated[
+        str | None, typer.Option(metavar="IDS", help="Vertices of --start that stay where they are, such as 0,3,5.")
+    ] = None,
+    symmetry: Annotated[
+        str | None,
+        typer.Option(metavar="[auto|X]", help="Left and right alike, about the best axis or x = X (0 to 1)."),
+    ] = None,
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out"),
     as_json: Annotated[
         bool, typer.Option("--json", help="Print a JSON record a line as each image is done, no table.")
@@ -76,13 +98,16 @@ def solve(
     """Check everything that can be checked before the work, then do it; return the exit code."""
     from agents.base import Budget
     from agents.solve_files import claim_folder
+    from agents.solve_guidance import read_wishes
     from agents.solve_report import Report
     from agents.solve_run import Settings, name_jobs, solve_all
     from autopoly_env.score import ScoreWeights
 
     weights = ScoreWeights(w_sm, w_sc, w_si)
     budget = Budget(refits, seconds)
-    settings = Settings(agent, _parse_options(option or []), seed, operators, resolution, max_steps, weights, budget)
+    wishes = read_wishes(importance, start, lock, symmetry)
+    options = _parse_options(option or [])
+    settings = Settings(agent, options, seed, operators, resolution, max_steps, weights, budget, wishes)
     settings.check()
     found, problems = _find(images)
     jobs = name_jobs(found, out)

@@ -16,10 +16,10 @@ from agents.base import Solution
 from autopoly_env import viewer
 from autopoly_env.arrays import ByteArray
 from autopoly_env.errors import OutputError
-from autopoly_env.export import contact_sheet, save_png, to_obj, to_svg
+from autopoly_env.export import contact_sheet, save_html, save_png, to_obj, to_svg
 from autopoly_env.silhouette import Silhouette
 
-RESULTS = ("sequence.json", "mesh.obj", "mesh.svg", "steps.png")
+RESULTS = ("sequence.json", "mesh.obj", "mesh.svg", "steps.png", "player.html")
 OVERVIEW = "overview.png"
 PAGE_SIZE = 3850  # pixels that an overview may have each way
 CELL_SIZE = 256  # pixels of a mesh in it, if that fits
@@ -60,6 +60,7 @@ def write_results(
             (staging / "mesh.obj").write_text(to_obj(solution.mesh), encoding="utf-8")
             (staging / "mesh.svg").write_text(to_svg(solution.mesh, target=silhouette), encoding="utf-8")
             save_png(contact_sheet(solution.sequence, silhouette), staging / "steps.png")
+            save_html(solution.sequence, staging / "player.html", silhouette)
             with shielded():
                 folder.mkdir(exist_ok=True)
                 for name in RESULTS:

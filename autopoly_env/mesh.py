@@ -151,6 +151,12 @@ class PolyMesh:
         n_vertices, n_edges, n_faces = self.counts
         return f"PolyMesh(V={n_vertices}, E={n_edges}, F={n_faces})"
 
+    def _repr_svg_(self) -> str:
+        """A drawing, for notebooks."""
+        from autopoly_env.export.svg import to_svg
+
+        return to_svg(self, size=320)
+
 
 def validate(mesh: PolyMesh) -> None:
     """Raise MeshError naming the first defect of a mesh. Flipped or crossing faces are no defect."""

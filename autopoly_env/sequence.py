@@ -116,6 +116,12 @@ class ConstructionSequence:
         sequence.meshes()
         return sequence
 
+    def _repr_html_(self) -> str:
+        """The player, for notebooks."""
+        from autopoly_env.export.player import to_frame
+
+        return to_frame(self)
+
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write `to_json` to a file, whole or not at all. Raises OutputError if it cannot be written."""
         target = Path(path)

@@ -1,0 +1,152 @@
+"""glTF 2.0: the construction as an animation for viewers, game engines and modelling programs."""
+
+import base64
+import json
+import os
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from autopoly_env.arrays import FloatArray
+from autopoly_env.errors import ConfigError
+from autopoly_env.export.replay import finite_meshes, sequence_name, unmoved
+from autopoly_env.export.solid import Solid, to_solid, to_triangles
+from autopoly_env.files import write_atomically
+from autopoly_env.sequence import ConstructionSequence
+
+STEP_SECONDS = 1.0
+MOVE_SECONDS = 0.6  # of these
+COLOUR = (0.32, 0.47, 0.76, 1.0)  # linear RGBA
+FLOAT, UINT = 5126, 5125  # component types
+VERTICES, INDICES = 34962, 34963  # what a buffer view is for
+
+
+def save_gltf(sequence: ConstructionSequence, path: str | os.PathLike[str], depth: float = 0.0) -> Path:
+    """Write a sequence as glTF: text with all data in it for the suffix .gltf, binary for .glb.
+
+    Each step is a node with the mesh after it, cut into triangles, x right, y up, z towards the viewer; `depth` (units
+    of the unit square) makes it a closed solid behind z = 0. The one animation shows a step a second, by the nodes'
+    scale 0 or 1; the vertices' moves are a morph target. At rest the last step shows and the others have scale 0.
+
+    Raises ConfigError for another suffix or a depth below 0 or not finite, SequenceError naming a step that cannot be
+    replayed, OutputError if the file cannot be written.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in (".gltf", ".glb"):
+        raise ConfigError(f"{path}: expected a file name that ends in .gltf (text) or .glb (binary)")
+    document, data = _document(sequence, depth)
+    if suffix == ".glb":
+        return write_atomically(path, _binary(document, data))
+    document["buffers"][0]["uri"] = "data:application/octet-stream;base64," + base64.b64encode(data).decode("ascii")
+    return write_atomically(path, json.dumps(document, indent=1) + "\n")
+
+
+class _Buffer:
+    """The one buffer of a file, and the views and accessors that tell what lies where in it."""
+
+    def __init__(self) -> None:
+        self.data = bytearray()
+        self.views: list[dict[str, Any]] = []
+        self.accessors: list[dict[str, Any]] = []
+
+    def add(self, values: npt.ArrayLike, use: int | None = None) -> int:
+        """Append scalars (n,) or vectors (n, 3), as floats or, for INDICES, as integers; gives the accessor's index."""
+        array = np.asarray(values, np.uint32 if use == INDICES else np.float32)
+        view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": array.nbytes}
+        self.views.append(view | ({"target": use} if use else {}))
+        self.data += array.astype(array.dtype.newbyteorder("<")).tobytes()
+        rows = array.reshape(len(array), -1)
+        self.accessors.append(
+            {
+                "bufferView": len(self.views) - 1,
+                "componentType": UINT if use == INDICES else FLOAT,
+                "count": len(array),
+                "type": "SCALAR" if array.ndim == 1 else "VEC3",
+                "min": rows.min(axis=0).tolist(),
+                "max": rows.max(axis=0).tolist(),
+            }
+        )
+        return len(self.accessors) - 1
+
+
+def _document(sequence: ConstructionSequence, depth: float) -> tuple[dict[str, Any], bytes]:
+    meshes = finite_meshes(sequence)
+    buffer, last = _Buffer(), len(meshes) - 1
+    shapes: list[dict[str, Any]] = []
+    nodes: list[dict[str, Any]] = []
+    animation: dict[str, Any] = {"name": "construction", "channels": [], "samplers": []}
+    for number, mesh in enumerate(meshes):
+        step = sequence.steps[number - 1] if number else None
+        name = f"{number} {step.operator if step else 'start'}"
+        solid = to_solid(mesh, depth)
+        shapes.append(_shape(buffer, name, solid))
+        nodes.append({"name": name, "mesh": number} | ({} if number == last else {"scale": [0.0, 0.0, 0.0]}))
+        _animate(buffer, animation, number, "scale", "STEP", *_scales(number, last))
+        offsets = (unmoved(step, meshes[number - 1], mesh) - mesh.vertices) * (1, -1) if step else np.zeros((1, 2))
+        if step and offsets.any():
+            _add_morph(buffer, shapes[-1], np.pad(offsets, ((0, 0), (0, 1)))[list(solid.sources)])
+            begin = STEP_SECONDS * number
+            _animate(buffer, animation, number, "weights", "LINEAR", [begin, begin + MOVE_SECONDS], [1.0, 0.0])
+    nodes.append({"name": sequence_name(sequence), "children": list(range(len(meshes)))})
+    material = {"pbrMetallicRoughness": {"baseColorFactor": COLOUR, "metallicFactor": 0.0, "roughnessFactor": 0.8}}
+    return {
+        "asset": {"version": "2.0", "generator": "AutoPoly"},
+        "scene": 0,
+        "scenes": [{"name": sequence_name(sequence), "nodes": [len(meshes)]}],
+        "nodes": nodes,
+        "meshes": shapes,
+        "materials": [{"name": "AutoPoly", "doubleSided": True, **material}],
+        "animations": [animation],
+        "accessors": buffer.accessors,
+        "bufferViews": buffer.views,
+        "buffers": [{"byteLength": len(buffer.data)}],
+    }, bytes(buffer.data)
+
+
+def _shape(buffer: _Buffer, name: str, solid: Solid) -> dict[str, Any]:
+    """The solid as a glTF mesh of triangles."""
+    primitive = {
+        "attributes": {"POSITION": buffer.add(solid.vertices, VERTICES)},
+        "indices": buffer.add(to_triangles(solid).ravel(), INDICES),
+        "material": 0,
+    }
+    return {"name": name, "primitives": [primitive]}
+
+
+def _scales(number: int, last: int) -> tuple[list[float], list[list[float]]]:
+    """When a step appears and goes, and its scale from then on; all steps have a key at 0, the last one at the end."""
+    begin, end = STEP_SECONDS * number, STEP_SECONDS * (number + 1)
+    keys = {0.0: float(number == 0), begin: 1.0, end: float(number == last)}
+    return list(keys), [[scale] * 3 for scale in keys.values()]
+
+
+def _add_morph(buffer: _Buffer, shape: dict[str, Any], offsets: FloatArray) -> None:
+    """A morph target that takes the vertices back to where the operator left them."""
+    shape["primitives"][0]["targets"] = [{"POSITION": buffer.add(offsets, VERTICES)}]
+    shape["weights"] = [0.0]
+    shape["extras"] = {"targetNames": ["unmoved"]}  # where viewers and Blender look for names
+
+
+def _animate(
+    buffer: _Buffer,
+    animation: dict[str, Any],
+    node: int,
+    path: str,
+    interpolation: str,
+    times: list[float],
+    values: npt.ArrayLike,
+) -> None:
+    sampler = {"input": buffer.add(times), "output": buffer.add(values), "interpolation": interpolation}
+    animation["channels"].append({"sampler": len(animation["samplers"]), "target": {"node": node, "path": path}})
+    animation["samplers"].append(sampler)
+
+
+def _binary(document: dict[str, Any], data: bytes) -> bytes:
+    """The container: a header of 12 bytes, then the text and the data as chunks of whole words."""
+    text = json.dumps(document).encode("ascii")
+    chunks = ((b"JSON", text + b" " * (-len(text) % 4)), (b"BIN\0", data + b"\0" * (-len(data) % 4)))
+    body = b"".join(struct.pack("<I", len(content)) + kind + content for kind, content in chunks)
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body

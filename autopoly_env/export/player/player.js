@@ -1,0 +1,335 @@
+
+// The player. Time runs from 0, the start, to the number of steps: step k lasts from k - 1 to k. In the first part of
+// it the operator works, in the rest the vertices move to fit the target.
+"use strict";
+(() => {
+  const STEP_MS = 1300, HOLD_MS = 900; // a step's motion, and the rest after it when playing
+  const SKIP_MS = 90, LONGEST_MS = 2600; // a further step when several are passed, and all of them together
+  const OPERATOR_SHARE = 0.45;
+  const SCALE = 1000, MARGIN = 0.07; // drawing units a unit square; of the box that is shown
+  const VERTEX_PX = 3.6, CHANGED_PX = 4.8, HIT_PX = 11;
+  const CURVE_INSET = 9, CURVE_TOP = 16, CURVE_BOTTOM = 6; // pixels; the inset is half a slider's thumb
+
+  const byId = id => document.getElementById(id);
+  const data = JSON.parse(byId("data").textContent), steps = data.steps, last = steps.length - 1;
+  const stage = byId("stage"), mesh = byId("mesh"), slider = byId("step"), tag = byId("tag");
+  const still = matchMedia("(prefers-reduced-motion: reduce)");
+  let shown = last, goal = last, playing = false, frame = 0, timer = 0;
+  let built = "", elements = [], named = null, unit = 1;
+
+  function make(kind, attributes = {}, ...children) {
+    const isDrawn = ["g", "path", "line", "circle", "text", "mask", "image", "rect", "title"].includes(kind);
+    const element = isDrawn ? document.createElementNS("http://www.w3.org/2000/svg", kind) : document.createElement(kind);
+    for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+    element.append(...children);
+    return element;
+  }
+  const set = (element, attributes) => { for (const name in attributes) element.setAttribute(name, attributes[name]); };
+  const ease = t => t * t * (3 - 2 * t);
+  const clamp = (value, low, high) => Math.min(high, Math.max(low, value));
+  const between = (a, b, t) => [a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t];
+
+  // What a step's mesh consists of.
+  for (const step of steps) {
+    step.edges = {};
+    for (const face of Object.values(step.faces))
+      face.forEach((a, i) => {
+        const b = face[(i + 1) % face.length];
+        step.edges[`${Math.min(a, b)}–${Math.max(a, b)}`] = [Math.min(a, b), Math.max(a, b)];
+      });
+    Object.assign(step, { put: {}, lost: {}, moved: [], takes: null, ...step });
+  }
+
+  // --- The mesh at a time ---
+
+  /** Elements for the mesh of step `topology`, seen as part of step `k`: marked as new, moved, or about to go. */
+  function build(topology, k) {
+    const key = `${topology}/${k}`;
+    if (key === built) return;
+    built = key;
+    const hadFocus = mesh.contains(document.activeElement);
+    const { vertices, edges, faces } = steps[topology], before = steps[Math.max(k - 1, 0)], after = steps[k];
+    elements = [];
+    const add = (kind, id, group, points, ...children) => {
+      const element = make("g", { class: kind, tabindex: -1, role: "img", "aria-label": `${kind} ${id}` }, ...children);
+      const isNew = !(id in before[group]), goes = !(id in after[group]);
+      element.classList.toggle("new", isNew);
+      element.classList.toggle("moved", kind === "vertex" && after.moved.includes(+id));
+      elements.push({ name: `${kind} ${id}`, kind, element, points, isNew, goes });
+      return element;
+    };
+    byId("vertices").replaceChildren(...Object.keys(vertices).map(id =>
+      add("vertex", id, "vertices", [id], make("circle", { class: "hit" }), make("circle", { class: "seen" }))));
+    byId("edges").replaceChildren(...Object.entries(edges).map(([id, ends]) =>
+      add("edge", id, "edges", ends, make("line", { class: "hit" }), make("line", { class: "seen" }))));
+    byId("faces").replaceChildren(...Object.entries(faces).map(([id, corners]) =>
+      add("face", id, "faces", corners, make("path", { class: "seen" }))));
+    byId("trails").replaceChildren(...(topology === k ? after.moved : []).filter(id => id in before.vertices).map(id => make("line", { class: "trail", "data-id": id })));
+    const item = elements.find(one => one.name === named) || elements[0];
+    item.element.setAttribute("tabindex", 0);
+    if (hadFocus) item.element.focus({ preventScroll: true });
+    else if (item.name === named) item.element.classList.add("named");
+    else hideTag();
+  }
+
+  /** Draw the moment `time`. */
+  function draw(time) {
+    const k = Math.ceil(time), part = k === 0 ? 1 : time - (k - 1), step = steps[k], before = steps[Math.max(k - 1, 0)];
+    const appear = ease(Math.min(1, part / OPERATOR_SHARE));
+    const settle = ease(clamp((part - OPERATOR_SHARE) / (1 - OPERATOR_SHARE), 0, 1));
+    build(step.takes && appear < 1 ? k - 1 : k, k);
+    const at = id => {
+      const [old, put, lost, now] = [before.vertices[id], step.put[id], step.lost[id], step.vertices[id]];
+      const start = put ? between(put, put.slice(2), appear) : lost ? between(old, lost, appear) : old;
+      return (now ? between(start, now, settle) : start).map(value => value * SCALE);
+    };
+    for (const { kind, element, points, isNew, goes } of elements) {
+      const places = points.map(at);
+      const fades = goes && (step.takes === "all" || step.takes === kind);
+      if (kind === "face") element.style.setProperty("--new", `${100 * appear}%`);
+      element.style.opacity = fades ? 1 - appear : isNew && kind !== "face" ? appear : 1;
+      if (kind === "face") element.firstChild.setAttribute("d", `M${places.join("L")}Z`);
+      else if (kind === "edge")
+        for (const line of element.children)
+          set(line, { x1: places[0][0], y1: places[0][1], x2: places[1][0], y2: places[1][1] });
+      else {
+        const isChanged = isNew || element.classList.contains("moved");
+        set(element.firstChild, { cx: places[0][0], cy: places[0][1], r: HIT_PX * unit });
+        set(element.lastChild, { cx: places[0][0], cy: places[0][1], r: (isChanged ? CHANGED_PX : VERTEX_PX) * unit });
+      }
+    }
+    for (const line of byId("trails").children) {
+      const [x1, y1] = before.vertices[line.dataset.id].map(value => value * SCALE), [x2, y2] = at(line.dataset.id);
+      set(line, { x1, y1, x2, y2 });
+    }
+    if (named) showTag(named);
+  }
+
+  /** Fit the drawing into its place: the box of everything, and the size of a pixel in it. */
+  function fit() {
+    const [x, y, width, height] = data.box.map(value => value * SCALE), margin = MARGIN * Math.max(width, height);
+    set(mesh, { viewBox: [x - margin, y - margin, width + 2 * margin, height + 2 * margin].join(" ") });
+    unit = 1 / mesh.getScreenCTM().a;
+    drawCurve();
+    draw(shown);
+    reveal();
+  }
+
+  // --- Names of elements ---
+
+  const itemOf = target => elements.find(item => item.element === target.closest("#mesh g[role]"));
+
+  function showTag(name) {
+    const item = elements.find(one => one.name === name);
+    if (!item) return hideTag();
+    if (named !== name) hideTag();
+    named = name;
+    const step = steps[Math.ceil(shown)], matrix = mesh.getScreenCTM(), frame = stage.getBoundingClientRect();
+    const box = item.element.getBBox(), isVertex = item.kind === "vertex";
+    const place = isVertex && step.vertices[item.points[0]];
+    tag.textContent = place ? `${name} · ${place[0].toFixed(3)}, ${place[1].toFixed(3)}` : name;
+    tag.hidden = false;
+    item.element.setAttribute("aria-label", tag.textContent);
+    item.element.classList.add("named");
+    const x = (box.x + box.width / 2) * matrix.a + matrix.e - frame.left - tag.offsetWidth / 2;
+    const middle = (box.y + box.height / 2) * matrix.d + matrix.f - frame.top;
+    const y = middle - tag.offsetHeight - 9 < 2 ? middle + 12 : middle - tag.offsetHeight - 9;
+    tag.style.transform = `translate(${clamp(x, 4, frame.width - tag.offsetWidth - 4)}px, ${clamp(y, 2, frame.height - tag.offsetHeight - 4)}px)`;
+  }
+
+  function hideTag() {
+    for (const item of elements) item.element.classList.remove("named");
+    named = null;
+    tag.hidden = true;
+  }
+
+  function walk(change) {
+    const i = elements.findIndex(item => item.element === document.activeElement);
+    const item = elements[(i + change + elements.length) % elements.length];
+    for (const other of elements) other.element.setAttribute("tabindex", -1);
+    item.element.setAttribute("tabindex", 0);
+    item.element.focus({ preventScroll: true });
+  }
+
+  mesh.addEventListener("pointerover", event => { const item = itemOf(event.target); item ? showTag(item.name) : hideTag(); });
+  mesh.addEventListener("pointerleave", () => hideTag());
+  // On the HTML around it: an SVG element that listens for focus becomes a stop of the tab key itself.
+  stage.addEventListener("focusin", event => { const item = itemOf(event.target); if (item) showTag(item.name); });
+  stage.addEventListener("focusout", event => { if (event.relatedTarget) hideTag(); });
+  mesh.addEventListener("keydown", event => {
+    const change = { ArrowDown: 1, ArrowUp: -1 }[event.key];
+    if (!change) return;
+    walk(change);
+    event.preventDefault();
+  });
+
+  // --- The score curve ---
+
+  const curveX = k => CURVE_INSET + (byId("curve").clientWidth - 2 * CURVE_INSET) * (last ? k / last : 0);
+
+  function drawCurve() {
+    const totals = steps.map(step => step.total), low = Math.min(...totals), high = Math.max(...totals);
+    const bottom = byId("curve").clientHeight - CURVE_BOTTOM;
+    const points = totals.map((total, k) => [curveX(k), bottom - (bottom - CURVE_TOP) * (high > low ? (total - low) / (high - low) : 0.5)]);
+    const now = Math.round(goal), best = totals.indexOf(high), path = list => list.length ? `M${list.join("L")}` : "";
+    set(byId("area"), { d: `${path(points)}L${[curveX(last), bottom + CURVE_BOTTOM]}L${[curveX(0), bottom + CURVE_BOTTOM]}Z` });
+    set(byId("behind"), { d: path(points.slice(0, now + 1)) });
+    set(byId("ahead"), { d: path(points.slice(now)) });
+    const small = last > 60 ? 0 : 2.4;
+    byId("dots").replaceChildren(...points.map(([cx, cy], k) => {
+      const title = make("title", {}, `step ${k}: ${totals[k].toFixed(2)}`);
+      const kind = k === now ? "current" : k < now ? "past" : "ahead";
+      return make("circle", { cx, cy, r: k === now ? 6 : small, class: kind }, title);
+    }));
+    const anchor = best > 0.85 * last ? "end" : best < 0.15 * last ? "start" : "middle";
+    byId("dots").append(make("text", { x: points[best][0], y: points[best][1] - 10, "text-anchor": anchor }, `best ${high.toFixed(2)}`));
+    byId("curve").setAttribute("aria-label", `Score r_all by step: ${totals[0].toFixed(2)} at the start, best ${high.toFixed(2)} at step ${best}, ${totals[last].toFixed(2)} at the end`);
+  }
+
+  byId("curve").addEventListener("click", event => {
+    const width = byId("curve").clientWidth - 2 * CURVE_INSET;
+    const x = event.clientX - byId("curve").getBoundingClientRect().left - CURVE_INSET;
+    stop();
+    go(Math.round(clamp(x / width, 0, 1) * last));
+  });
+
+  // --- Words ---
+
+  function keysOf(text) {
+    return text.split("`").map((part, i) => (i % 2 ? make("kbd", {}, part) : part));
+  }
+
+  function tell(k) {
+    const step = steps[k], which = k === 0 ? "Start" : `Step ${k} of ${last}`;
+    byId("total").textContent = step.total.toFixed(2);
+    byId("iou").textContent = step.iou.toFixed(3);
+    byId("crossed").hidden = !step.crossings;
+    byId("crossings").textContent = step.crossings;
+    ["n-vertices", "n-edges", "n-faces"].forEach((id, i) => { byId(id).textContent = step.counts[i]; });
+    byId("count").textContent = `${k} / ${last}`;
+    byId("which").textContent = k === 0 ? `Before step 1 of ${last}` : which;
+    byId("what").textContent = step.title;
+    byId("done").textContent = step.done;
+    byId("keys").replaceChildren(...step.keys.map(text => make("li", {}, ...keysOf(text))));
+    byId("menu").replaceChildren(make("span", {}, step.menu), make("code", {}, step.blender));
+    set(slider, { "aria-valuetext": `${which}, ${step.title}` });
+    slider.value = k;
+    slider.style.setProperty("--filled", `${last ? (100 * k) / last : 0}%`);
+    byId("previous").setAttribute("aria-disabled", k === 0);
+    byId("next").setAttribute("aria-disabled", k === last);
+    const [vertices, edges, faces] = step.counts;
+    set(mesh, { "aria-label": `Mesh: ${which}, vertices ${vertices}, edges ${edges}, faces ${faces}` });
+    document.querySelectorAll("#steps button").forEach((button, i) => {
+      if (i === k) button.setAttribute("aria-current", "step");
+      else button.removeAttribute("aria-current");
+    });
+    reveal();
+    drawCurve();
+  }
+
+  /** Scroll the list, where it scrolls, so that the current step and those beside it are seen. */
+  function reveal() {
+    const list = byId("steps"), item = list.children[goal], top = item.offsetTop - list.offsetTop;
+    list.scrollTop = clamp(list.scrollTop, top + 2 * item.offsetHeight - list.clientHeight, top - item.offsetHeight);
+  }
+
+  byId("steps").append(...steps.map((step, k) => {
+    const gain = k ? step.total - steps[k - 1].total : 0, sign = gain < 0 ? "−" : "+";
+    const gained = k ? `${sign}${Math.abs(gain).toFixed(2)}` : step.total.toFixed(2);
+    const part = (name, text) => make("span", { class: name }, text);
+    const button = make("button", { type: "button" }, part("number", k), part("title", step.title), part("gain", gained));
+    button.addEventListener("click", () => { stop(); go(k); });
+    return make("li", {}, button);
+  }));
+
+  // --- Motion ---
+
+  /** Go to step k, through all that lies between. */
+  function go(k) {
+    cancelAnimationFrame(frame);
+    goal = clamp(k, 0, last);
+    tell(goal);
+    if (still.matches) { shown = goal; draw(shown); return arrive(); }
+    const from = shown, way = Math.abs(goal - from), begun = performance.now();
+    const duration = way <= 1 ? STEP_MS * way : Math.min(LONGEST_MS, STEP_MS + SKIP_MS * (way - 1));
+    const move = () => {
+      const part = duration ? clamp((performance.now() - begun) / duration, 0, 1) : 1;
+      shown = part === 1 ? goal : from + (goal - from) * part;
+      draw(shown);
+      if (part < 1) frame = requestAnimationFrame(move);
+      else arrive();
+    };
+    frame = requestAnimationFrame(move);
+  }
+
+  function arrive() {
+    clearTimeout(timer);
+    if (playing && goal === last) stop();
+    if (playing) timer = setTimeout(() => go(goal + 1), still.matches ? STEP_MS + HOLD_MS : HOLD_MS);
+  }
+
+  function stop() {
+    playing = false;
+    clearTimeout(timer);
+    showPlaying();
+  }
+
+  function toggle() {
+    if (playing) return stop();
+    playing = true;
+    showPlaying();
+    if (goal === last) { shown = goal = 0; tell(0); draw(0); arrive(); }
+    else go(goal + 1);
+  }
+
+  function showPlaying() {
+    document.body.classList.toggle("playing", playing);
+    byId("play").setAttribute("aria-label", playing ? "Pause" : "Play");
+  }
+
+  byId("play").addEventListener("click", toggle);
+  byId("previous").addEventListener("click", () => { stop(); go(goal - 1); });
+  byId("next").addEventListener("click", () => { stop(); go(goal + 1); });
+  slider.addEventListener("input", () => { stop(); go(+slider.value); });
+  document.addEventListener("keydown", event => {
+    const isRange = event.target.type === "range", isPressed = event.target.closest?.("button, input");
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    if (event.key === " " && (isRange || !isPressed)) toggle();
+    else if (isRange) return;
+    else if (event.key === "ArrowRight") { stop(); go(goal + 1); }
+    else if (event.key === "ArrowLeft") { stop(); go(goal - 1); }
+    else if (event.key === "Home") { stop(); go(0); }
+    else if (event.key === "End") { stop(); go(last); }
+    else return;
+    event.preventDefault();
+  });
+
+  // --- The target ---
+
+  function showTarget() {
+    const isOn = byId("show-target").checked, opacity = byId("opacity");
+    opacity.disabled = !isOn;
+    opacity.style.setProperty("--filled", `${opacity.value}%`);
+    opacity.setAttribute("aria-valuetext", `${opacity.value} %`);
+    byId("target").style.opacity = isOn ? opacity.value / 100 : 0;
+    byId("legend-target").hidden = !isOn;
+  }
+
+  if (data.target) {
+    const whole = { x: 0, y: 0, width: SCALE, height: SCALE };
+    byId("target").append(
+      make("mask", { id: "shape" }, make("image", { ...whole, href: data.target })),
+      make("rect", { ...whole, mask: "url(#shape)" }));
+    byId("overlay").hidden = false;
+    byId("show-target").addEventListener("change", showTarget);
+    byId("opacity").addEventListener("input", showTarget);
+    showTarget();
+  }
+
+  const asked = /^#step-(\d+)$/.exec(location.hash);
+  if (asked) shown = goal = Math.min(+asked[1], last);
+  slider.max = last;
+  new ResizeObserver(fit).observe(stage);
+  fit();
+  tell(goal);
+})();
