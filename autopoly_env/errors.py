@@ -29,6 +29,10 @@ class OutputError(AutoPolyError):
     """A result that cannot be written where it was asked to go."""
 
 
+class RunError(AutoPolyError):
+    """A folder of results that cannot be read, or that belongs to another run."""
+
+
 class EpisodeError(AutoPolyError):
     """An environment used out of turn: before a reset, or after the episode's end."""
 

@@ -1,4 +1,4 @@
-"""Where targets come from: the paper's random constructions, drawings of made-up things, folders of images.
+"""Where targets come from: random constructions, drawings of made-up things, folders of images and of 3-D models.
 
 A source gives a `Silhouette` for every seed, the same one each time:
 
@@ -14,6 +14,7 @@ from autopoly_env.errors import ConfigError
 from autopoly_env.targets.construction import ConstructionTargets
 from autopoly_env.targets.folder import FolderTargets
 from autopoly_env.targets.objects import ObjectTargets
+from autopoly_env.targets.shapenet import ShapeNetTargets
 from autopoly_env.targets.source import SPLITS, TargetSource, split_seed
 
 __all__ = [
@@ -21,21 +22,23 @@ __all__ = [
     "ConstructionTargets",
     "FolderTargets",
     "ObjectTargets",
+    "ShapeNetTargets",
     "TargetSource",
     "make_targets",
     "split_seed",
 ]
 
-_KINDS: dict[str, type[ConstructionTargets] | type[ObjectTargets]] = {
+_KINDS: dict[str, type[ConstructionTargets] | type[ObjectTargets] | type[ShapeNetTargets]] = {
     "construction": ConstructionTargets,
     "objects": ObjectTargets,
+    "shapenet": ShapeNetTargets,
 }
 
 
 def make_targets(name_or_folder: str | os.PathLike[str], **options: Any) -> TargetSource:
-    """The source "construction" or "objects" with its options, or else the images of a folder (no options).
+    """The source "construction", "objects" or "shapenet" with its options, or else the images of a folder (no options).
 
-    Raises ConfigError for another name, or for an option that the source does not have or allow; SilhouetteError
+    Raises ConfigError for another name, for an option that the source does not have or allow, or needs; SilhouetteError
     for a folder without images.
     """
     name = os.fspath(name_or_folder)
@@ -49,4 +52,7 @@ def make_targets(name_or_folder: str | os.PathLike[str], **options: Any) -> Targ
     unknown = [option for option in options if option not in allowed]
     if unknown:
         raise ConfigError(f"targets {name!r} have no option {unknown[0]!r}; give one of {', '.join(allowed)}")
+    needed = [option for option, p in allowed.items() if p.default is p.empty and option not in options]
+    if needed:
+        raise ConfigError(f"targets {name!r} need the option {needed[0]!r}; give it")
     return _KINDS[name](**options)

@@ -1,0 +1,108 @@
+"""The command `python -m training.compare`: the results of several runs side by side, as a page to look at."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from autopoly_env.errors import ConfigError
+from autopoly_env.files import write_atomically
+from training.command import run_command
+from training.report.comparison import Row, read_runs, rows_of
+from training.report.page import page_html
+from training.report.tables import FORMATS, as_record, csv_table, duel, markdown_table, plain
+
+HELP = """Compare the agents of one or more runs of training.evaluate.
+
+\b
+Examples:
+  python -m training.compare runs/mine
+  python -m training.compare runs/before runs/after --baseline "climb (before)" --out changes.html
+  python -m training.compare runs/* --json | jq .r_all
+
+\b
+Written are, whole or not at all,
+  report.html  tables, charts and every agent's meshes of the worst targets: one file that needs no network
+  report.md    the headline table, to paste    report.csv  the same with all digits
+
+An agent that several runs have is called "agent (run)". Numbers are means over targets with 95 % bootstrap intervals;
+the baseline, by default the suite's or else the first agent, is what wins and losses are counted against.
+
+Exit codes: 0 all is well, 1 a run cannot be read or the report cannot be written, 2 wrong usage, 130 Ctrl-C.
+"""
+
+PLAIN_WIDTH = 150  # of a table that goes to a file
+N_CARDS = 60
+
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode="rich")
+
+
+@app.command(help=HELP, context_settings={"help_option_names": ["-h", "--help"]})
+def compare(
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN", help="Folders that training.evaluate has written.")],
+    out: Annotated[Path, typer.Option(help="The page; .md and .csv lie beside it.")] = Path("report.html"),
+    baseline: Annotated[
+        str | None, typer.Option(help="The label of an agent.", show_default="that of the suite")
+    ] = None,
+    title: Annotated[str, typer.Option(help="What the page is called.")] = "AutoPoly: agents compared",
+    gallery: Annotated[int, typer.Option(help="Targets whose meshes are shown, the worst ones.")] = N_CARDS,
+    as_json: Annotated[bool, typer.Option("--json", help="Print a JSON record an agent, no table.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Print no table.")] = False,
+) -> int:
+    """Read everything, then write the three files and show the table."""
+    if out.suffix not in (".html", ".htm"):
+        raise ConfigError(f"--out {out}: expected a name that ends in .html")
+    if gallery < 0:
+        raise ConfigError(f"--gallery {gallery}: expected 0 or more targets")
+    comparison = read_runs(runs, baseline)
+    rows = rows_of(comparison)
+    page = page_html(comparison, rows, gallery, title)
+    texts = {
+        out.with_suffix(".md"): markdown_table(rows, comparison.baseline, comparison.notes),
+        out.with_suffix(".csv"): csv_table(rows),
+        out: page,
+    }
+    for path, text in texts.items():
+        write_atomically(path, text.encode("utf-8", "replace"))
+    messages = Console(stderr=True)
+    for note in comparison.notes:
+        messages.print(f"warning: {note}", markup=False, highlight=False, emoji=False, soft_wrap=True)
+    if as_json:
+        for row in rows:
+            print(json.dumps(as_record(row), allow_nan=False))
+    elif not quiet:
+        _print_table(rows)
+        Console().print(f"Open {out}", markup=False, highlight=False, emoji=False, soft_wrap=True)
+    return 0
+
+
+def _print_table(rows: list[Row]) -> None:
+    console = Console()
+    if not console.is_terminal:
+        console.width = PLAIN_WIDTH
+    table = Table(caption="means over targets [95 % interval]", caption_style="dim", box=None, pad_edge=False)
+    table.add_column("agent", overflow="fold")
+    for head in ("targets", *FORMATS, "won–tied–lost"):
+        table.add_column(head, justify="right")
+    for row in rows:
+        n_targets = f"{row.n_targets}" + (f" ({row.n_failed} failed)" if row.n_failed else "")
+        means = [
+            plain(row.means[name], form) if name == "r_all" else plain(row.means[name], form).split(" [")[0]
+            for name, form in FORMATS.items()
+        ]
+        table.add_row(Text(row.label), n_targets, *means, "baseline" if row.is_baseline else duel(row))
+    console.print(table)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command; whatever is wrong is told in one line on stderr. Returns the exit code."""
+    return run_command(app, arguments, "python -m training.compare")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

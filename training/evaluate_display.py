@@ -1,0 +1,100 @@
+"""What `training.evaluate` shows while it works: done, in work, the best agent so far, the time left."""
+
+import time
+from collections import Counter, defaultdict
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    SpinnerColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+from training.records import Record
+from training.tasks import Task
+
+SECONDS_A_LINE = 30.0  # where there is no terminal
+MOST_FAILURES = 20  # that are told one by one
+MOST_NAMES = 2  # of tasks in work
+
+
+class Display:
+    """A progress bar on stderr; where that is no terminal, a line now and then. A context."""
+
+    def __init__(self, n_tasks: int, n_done: int, *, quiet: bool) -> None:
+        self.n_failed = 0
+        self._quiet = quiet
+        self._console = Console(stderr=True)
+        self._bar = Progress(
+            SpinnerColumn(),
+            MofNCompleteColumn(),
+            BarColumn(bar_width=20),
+            TimeElapsedColumn(),
+            TextColumn("left"),
+            TimeRemainingColumn(elapsed_when_finished=False),
+            TextColumn("{task.description}", markup=False),
+            console=self._console,
+            disable=quiet or not self._console.is_terminal,
+            redirect_stdout=False,
+            transient=True,
+            speed_estimate_period=300.0,
+        )
+        self._row = self._bar.add_task("", total=n_tasks, completed=n_done)
+        self._n_tasks, self._n_done, self._n_new = n_tasks, n_done, 0
+        self._began = self._said = time.monotonic()
+        self._in_work: dict[tuple[str, str, int], None] = {}
+        self._sums: defaultdict[str, float] = defaultdict(float)
+        self._counts: Counter[str] = Counter()
+
+    def __enter__(self) -> "Display":
+        self._bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.stop()
+
+    def begun(self, task: Task) -> None:
+        """A worker has a task."""
+        self._in_work[_key(task)] = None
+        self._bar.update(self._row, description=self._text())
+
+    def done(self, task: Task, record: Record) -> None:
+        """A task is over and recorded."""
+        self._in_work.pop(_key(task), None)
+        self._n_done += 1
+        self._n_new += 1
+        if record.outcome is None:
+            self.n_failed += 1
+            if self.n_failed <= MOST_FAILURES:
+                self._say(f"failed: {record.agent} on {record.target}: {record.error}")
+        else:
+            self._sums[record.agent] += record.outcome.r_all
+            self._counts[record.agent] += 1
+        self._bar.update(self._row, completed=self._n_done, description=self._text())
+        now = time.monotonic()
+        if not self._console.is_terminal and not self._quiet and now - self._said >= SECONDS_A_LINE:
+            self._said = now
+            left = (now - self._began) / self._n_new * (self._n_tasks - self._n_done)
+            self._say(f"{self._n_done} of {self._n_tasks} done, {left:.0f} s left; {self._text()}")
+
+    def _text(self) -> str:
+        names = [f"{label} on {target}" for label, target, _ in self._in_work]
+        more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+        parts = [", ".join(names[:MOST_NAMES]) + more] if names else []
+        if self._counts:
+            best = max(self._counts, key=lambda label: self._sums[label] / self._counts[label])
+            parts.insert(0, f"best so far {best} {self._sums[best] / self._counts[best]:.2f}")
+        if self.n_failed:
+            parts.insert(0, f"{self.n_failed} failed")
+        return "; ".join(parts)
+
+    def _say(self, text: str) -> None:
+        self._console.print(text, markup=False, highlight=False, emoji=False, soft_wrap=True)
+
+
+def _key(task: Task) -> tuple[str, str, int]:
+    return task.agent, task.target.name, task.seed

@@ -1,0 +1,233 @@
+"""The command `python -m training.make_dataset`: targets by the thousand, on disk, for training and tests."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from autopoly_env.errors import ConfigError
+from training.command import FAILURE, INTERRUPTED, run_command
+
+HELP = """Make data sets of targets, check them, draw silhouettes of 3-D models.
+
+\b
+Examples:
+  python -m training.make_dataset constructions --n 100000 --out data/train
+  python -m training.make_dataset constructions --n 1000 --split validation --difficulty 3-5 --out data/validation
+  python -m training.make_dataset objects --n 5000 --resolution 256 --out data/objects
+  python -m training.make_dataset verify data/train
+  python -m training.make_dataset silhouettes chair.obj lamp.glb --view front --out data/models
+  python -m training.make_dataset silhouettes ShapeNetCore.v2 --categories chair,lamp --split test --out data/shapenet
+
+What was killed goes on with --resume. Target number i depends on --seed and i alone: neither --workers nor
+--shard-size nor --n changes it. No two seeds or splits share a target. Read with training.dataset.read_shards.
+
+Exit codes: 0 all is well, 1 something failed, 2 wrong usage, 130 Ctrl-C.
+"""
+
+app = typer.Typer(
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    help=HELP,
+    no_args_is_help=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+Number = Annotated[int, typer.Option("--n", help="How many targets.")]
+Out = Annotated[Path, typer.Option(help="Folder of the data set.")]
+Split = Annotated[str, typer.Option(help="train, validation or test.")]
+Seed = Annotated[int, typer.Option(help="0 to 255; every seed has targets of its own.")]
+Resolution = Annotated[int, typer.Option(help="Pixels a side.")]
+ShardSize = Annotated[int, typer.Option(help="Targets a file.")]
+Engine = Annotated[str, typer.Option(help="serial, process or ray.")]
+Workers = Annotated[int | None, typer.Option(help="How many at once.", show_default="the cores there are")]
+RayAddress = Annotated[
+    str | None, typer.Option(help="Of a Ray cluster: auto or host:port.", show_default="one is started here")
+]
+Resume = Annotated[bool, typer.Option("--resume", help="Go on with the data set in OUT, if there is one.")]
+Fresh = Annotated[bool, typer.Option("--fresh", help="Replace the data set in OUT.")]
+Quiet = Annotated[bool, typer.Option("--quiet", help="No progress.")]
+
+
+@app.command()
+def constructions(
+    n: Number,
+    out: Out,
+    difficulty: Annotated[str, typer.Option(help="Changes of the outline: a number or a range.")] = "1-5",
+    operators: Annotated[str, typer.Option(help="paper, full, or operators, separated by commas.")] = "paper",
+    split: Split = "train",
+    seed: Seed = 0,
+    resolution: Resolution = 128,
+    shard_size: ShardSize = 512,
+    engine: Engine = "process",
+    workers: Workers = None,
+    ray_address: RayAddress = None,
+    resume: Resume = False,
+    fresh: Fresh = False,
+    quiet: Quiet = False,
+) -> int:
+    """Shapes of the random construction simulator, with the sequences that made them."""
+    from training.build_dataset import Settings
+
+    settings = Settings("constructions", split, seed, resolution, _range(difficulty), operators)
+    machines = {"engine": engine, "n_workers": workers, "address": ray_address}
+    return _build(settings, out, n, shard_size, machines, resume, fresh, quiet)
+
+
+@app.command()
+def objects(
+    n: Number,
+    out: Out,
+    families: Annotated[str | None, typer.Option(help="Some of them, by commas.", show_default="all")] = None,
+    split: Split = "train",
+    seed: Seed = 0,
+    resolution: Resolution = 256,
+    shard_size: ShardSize = 512,
+    engine: Engine = "process",
+    workers: Workers = None,
+    ray_address: RayAddress = None,
+    resume: Resume = False,
+    fresh: Fresh = False,
+    quiet: Quiet = False,
+) -> int:
+    """Drawings of man-made things; how to construct them is not known."""
+    from training.build_dataset import Settings
+
+    settings = Settings("objects", split, seed, resolution, families=families)
+    machines = {"engine": engine, "n_workers": workers, "address": ray_address}
+    return _build(settings, out, n, shard_size, machines, resume, fresh, quiet)
+
+
+@app.command()
+def verify(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A data set.")],
+    quiet: Quiet = False,
+) -> int:
+    """Check every shard's checksum and content, and replay every construction sequence."""
+    from training.build_dataset import check_dataset
+    from training.dataset import read_manifest
+
+    manifest = read_manifest(folder)
+    n_wrong = 0
+    with _progress(len(manifest.names), 0, quiet) as bar:
+        for _, problem in check_dataset(folder):
+            n_wrong += problem is not None
+            if problem is not None:
+                _say(bar, f"error: {problem}")
+            bar.advance(bar.task_ids[0])
+    n_right = len(manifest.names) - n_wrong
+    print(f"{folder}: {n_right} of {len(manifest.names)} shards are as they should be ({manifest.n} targets)")
+    return FAILURE if n_wrong else 0
+
+
+@app.command()
+def silhouettes(
+    models: Annotated[list[Path], typer.Argument(metavar="MODEL", help="Files, or folders of ShapeNet models.")],
+    out: Annotated[Path, typer.Option(help="Folder of the pictures.")],
+    view: Annotated[str, typer.Option(help="side, front or top; models have +y up and face -z.")] = "side",
+    resolution: Resolution = 256,
+    categories: Annotated[
+        str | None, typer.Option(help="Of ShapeNet: names or synset ids, by commas.", show_default="all")
+    ] = None,
+    split: Annotated[
+        str | None, typer.Option(help="Of ShapeNet: train, validation or test.", show_default="all")
+    ] = None,
+    engine: Engine = "process",
+    workers: Workers = None,
+    quiet: Quiet = False,
+) -> int:
+    """Draw the silhouette of every model as OUT/NAME.png; OUT/silhouettes.jsonl says what became of each."""
+    from autopoly_env.files import write_atomically
+    from training.model_silhouettes import draw_model, needs_trimesh, tasks_of, write_index
+    from training.parallel import map_tasks
+
+    tasks = tasks_of(models, view, resolution, categories, split)
+    needs_trimesh(tasks)
+    engine = "serial" if len(tasks) == 1 and engine == "process" else engine
+    records: dict[str, dict[str, str | None]] = {}
+    with _progress(len(tasks), 0, quiet) as bar:
+        for done in map_tasks(draw_model, tasks, engine=engine, n_workers=workers):
+            picture = None if done.value is None else write_atomically(out / f"{done.task.name}.png", done.value).name
+            records[done.task.name] = {"model": str(done.task.model), "picture": picture, "error": done.error}
+            if done.error is not None:
+                _say(bar, f"error: {done.error}")
+            bar.advance(bar.task_ids[0])
+    write_index(out, [records[task.name] for task in tasks])
+    n_failed = sum(record["error"] is not None for record in records.values())
+    print(f"{out}: {len(tasks) - n_failed} of {len(tasks)} silhouettes")
+    return FAILURE if n_failed else 0
+
+
+def _build(
+    settings: Any, out: Path, n: int, shard_size: int, machines: dict[str, Any], resume: bool, fresh: bool, quiet: bool
+) -> int:
+    """Make the data set and tell of it; returns the exit code."""
+    from training.build_dataset import begin_dataset, build_dataset
+    from training.dataset import ShardInfo
+
+    if resume and fresh:
+        raise ConfigError("--resume and --fresh: give one of them")
+    manifest = begin_dataset(out, settings, n, shard_size, resume=resume, fresh=fresh)
+    n_done, n_shards = len(manifest.shards), len(manifest.names)
+    try:
+        with _progress(n_shards, n_done, quiet) as bar:
+
+            def on_shard(_: ShardInfo | None, problem: str | None) -> None:
+                if problem is not None:
+                    _say(bar, f"error: {problem}")
+                bar.advance(bar.task_ids[0])
+
+            manifest = build_dataset(out, settings, manifest, **machines, on_shard=on_shard)
+    except KeyboardInterrupt:
+        print(f"stopped by Ctrl-C; what was done is in {out}: go on with --resume", file=sys.stderr)
+        return INTERRUPTED
+    n_there = sum(shard.n for shard in manifest.shards)
+    print(f"{out}: {n_there} of {n} targets in {len(manifest.shards)} of {n_shards} shards")
+    return 0 if n_there == n else FAILURE
+
+
+def _range(text: str) -> tuple[int, int]:
+    """ "3" or "1-5" as the least and the most."""
+    least, _, most = text.partition("-")
+    if not least.isdecimal() or not (most or least).isdecimal():
+        raise ConfigError(f"--difficulty {text}: expected a number or a range, such as 3 or 1-5")
+    return int(least), int(most or least)
+
+
+@contextmanager
+def _progress(n: int, n_done: int, quiet: bool) -> Iterator[Progress]:
+    """A progress bar on stderr, where that is a terminal."""
+    console = Console(stderr=True)
+    bar = Progress(
+        MofNCompleteColumn(),
+        BarColumn(bar_width=24),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        console=console,
+        disable=quiet or not console.is_terminal,
+        redirect_stdout=False,
+        transient=True,
+    )
+    bar.add_task("", total=n, completed=n_done)
+    with bar:
+        yield bar
+
+
+def _say(bar: Progress, text: str) -> None:
+    bar.console.print(" ".join(text.split()), markup=False, highlight=False, emoji=False, soft_wrap=True)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command; whatever is wrong is told in one line on stderr. Returns the exit code."""
+    return run_command(app, arguments, "python -m training.make_dataset")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
