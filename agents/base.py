@@ -2,8 +2,11 @@
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
+from itertools import islice
+from typing import TypeVar
 
 from autopoly_env.actions import STOP, Action
 from autopoly_env.edits import Choice
@@ -14,6 +17,9 @@ from autopoly_env.score import Score
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence_file import Score as PlainScore
 from autopoly_env.simulator import Simulator, State
+
+
+_Start = TypeVar("_Start")
 
 
 @dataclass(frozen=True)
@@ -31,11 +37,20 @@ class Budget:
 
     refits: int | None = None
     seconds: float | None = None
+    simulations: int | None = None  # of a tree search, what its seeds do not counted
 
     def __post_init__(self) -> None:
-        for name, value in (("refits", self.refits), ("seconds", self.seconds)):
+        for name, value in vars(self).items():
             if value is not None and not value >= 0:
                 raise ConfigError(f"a budget of {value} {name}: expected at least 0")
+
+    def share(self, part: float) -> "Budget":
+        """A part, 0 to 1, of it."""
+        return Budget(
+            None if self.refits is None else round(part * self.refits),
+            None if self.seconds is None else part * self.seconds,
+            None if self.simulations is None else round(part * self.simulations),
+        )
 
 
 @dataclass(frozen=True)
@@ -45,6 +60,7 @@ class Progress:
     best_total: float  # r_all of the best shape so far
     n_steps: int
     n_refits: int
+    n_nodes: int = 0  # of the search tree, where there is one
 
 
 @dataclass(frozen=True)
@@ -53,7 +69,7 @@ class Stats:
 
     n_refits: int
     seconds: float
-    stopped_by: str  # "finished", "refits", "seconds" or "interrupted"
+    stopped_by: str  # "finished", "interrupted", or what was spent: "refits", "seconds" or "simulations"
 
 
 @dataclass(frozen=True)
@@ -67,14 +83,19 @@ class Solution:
 
 
 class Meter:
-    """Counts the work of one solve, reports it, and says when the budget is spent."""
+    """Counts the work of one solve, reports it, and says when the budget is spent.
 
-    def __init__(self, budget: Budget, on_progress: Callable[[Progress], None] | None = None) -> None:
+    What a part of it (`part`) counts, it counts, too.
+    """
+
+    def __init__(
+        self, budget: Budget, on_progress: Callable[[Progress], None] | None = None, whole: "Meter | None" = None
+    ) -> None:
         self._budget = budget
         self._on_progress = on_progress
+        self._whole = whole
         self._began = time.perf_counter()
-        self._n_steps = 0
-        self._n_refits = 0
+        self._n_steps = self._n_refits = self._n_simulations = self._n_nodes = 0
         self._best_total = float("-inf")
         self.stopped_by = "finished"
 
@@ -83,38 +104,62 @@ class Meter:
         """A meter that never says stop."""
         return cls(Budget())
 
+    def part(self, share: float) -> "Meter":
+        """A meter for a share, 0 to 1, of what is left."""
+        return Meter(self.rest().share(share), whole=self)
+
     def add(self, states: Sequence[State]) -> None:
         """Note the states that one step of work produced."""
         best = max((state.score.total for state in states), default=float("-inf"))
         self.count(sum(state.n_refits for state in states), best)
+
+    def add_simulation(self, n_nodes: int) -> None:
+        """Note a simulation that made so many new nodes, before what it did is added or counted."""
+        self._n_simulations += 1
+        self._n_nodes += n_nodes
+        if self._whole is not None:
+            self._whole.add_simulation(n_nodes)
 
     def count(self, n_refits: int, best_total: float) -> None:
         """Note one step of work that took `n_refits` and whose best shape has r_all `best_total`."""
         self._n_steps += 1
         self._n_refits += n_refits
         self._best_total = max(self._best_total, best_total)
+        if self._whole is not None:
+            self._whole.count(n_refits, best_total)
         if self._on_progress is not None:
-            self._on_progress(Progress(self._best_total, self._n_steps, self._n_refits))
+            self._on_progress(Progress(self._best_total, self._n_steps, self._n_refits, self._n_nodes))
 
     def spent(self) -> bool:
-        """Whether the budget is used up."""
-        if self._budget.refits is not None and self._n_refits >= self._budget.refits:
-            self.stopped_by = "refits"
-        elif self._budget.seconds is not None and time.perf_counter() - self._began >= self._budget.seconds:
-            self.stopped_by = "seconds"
+        """Whether the budget is used up, or the one that this is a part of."""
+        used = {"refits": self._n_refits, "seconds": self._seconds(), "simulations": self._n_simulations}
+        for name, limit in vars(self._budget).items():
+            if limit is not None and used[name] >= limit:
+                self.stopped_by = name
+                break
+        if self._whole is not None and self._whole.spent():
+            self.stopped_by = self._whole.stopped_by
         return self.stopped_by != "finished"
 
     def rest(self) -> Budget:
         """What is left of the budget."""
-        seconds, refits = self._budget.seconds, self._budget.refits
+        refits, seconds, simulations = self._budget.refits, self._budget.seconds, self._budget.simulations
         return Budget(
             None if refits is None else max(0, refits - self._n_refits),
-            None if seconds is None else max(0.0, seconds - (time.perf_counter() - self._began)),
+            None if seconds is None else max(0.0, seconds - self._seconds()),
+            None if simulations is None else max(0, simulations - self._n_simulations),
         )
+
+    def affordable(self, starts: Iterable[_Start]) -> list[_Start]:
+        """As many of the things to refit as refits are left for."""
+        return list(islice(starts, self.rest().refits))
 
     def stats(self) -> Stats:
         """The work so far."""
-        return Stats(self._n_refits, time.perf_counter() - self._began, self.stopped_by)
+        return Stats(self._n_refits, self._seconds(), self.stopped_by)
+
+    def _seconds(self) -> float:
+        return time.perf_counter() - self._began
 
 
 @dataclass(frozen=True)
@@ -138,6 +183,7 @@ class Agent(ABC):
     """Chooses actions. `solve` plays them out; an agent that does not play step by step overrides it instead."""
 
     name = "agent"
+    runs_simulations = False  # what a budget may limit
     takes_guidance = True  # a start mesh, locked vertices and symmetry, which the transitions it plays keep to
 
     @abstractmethod
@@ -212,12 +258,22 @@ def finish(simulator: Simulator, states: Sequence[State], meter: Meter) -> Solut
     """The solution that `states` construct, the last mesh polished, scored at the silhouette's own resolution.
 
     A start mesh that nothing was done to stays as it is; a sequence that was gone on from comes before the new steps.
+    A KeyboardInterrupt on the way is noted, and the work done nevertheless.
     """
+    try:
+        return _finish(simulator, states, meter)
+    except KeyboardInterrupt:
+        meter.stopped_by = "interrupted"
+        return _finish(simulator, states, meter)
+
+
+def _finish(simulator: Simulator, states: Sequence[State], meter: Meter) -> Solution:
     meshes = [state.mesh for state in states]
     if len(meshes) > 1 or simulator.guidance.start is None:
-        meshes[-1] = simulator.polish(meshes[-1])
+        meshes[-1] = _polished(simulator, meshes)
     scores = [simulator.final_score(mesh) for mesh in meshes]
-    last = max(range(len(scores)), key=lambda k: (scores[k].total, -k))
+    docked = [0.0, *(simulator.docked(*pair) for pair in pairwise(meshes))]
+    last = max(range(len(scores)), key=lambda k: (scores[k].total - docked[k], -k))
     settings = {**simulator.settings(), "scored_at": simulator.silhouette.resolution}
     transitions = [
         transition
@@ -229,6 +285,16 @@ def finish(simulator: Simulator, states: Sequence[State], meter: Meter) -> Solut
     if earlier is not None:
         sequence = continued(earlier, sequence, [simulator.final_score(mesh).as_dict() for mesh in earlier.meshes()])
     return Solution(sequence, meshes[last], scores[last], meter.stats())
+
+
+def _polished(simulator: Simulator, meshes: Sequence[PolyMesh]) -> PolyMesh:
+    """The last mesh polished, unless that moves too much of what was there before the last step."""
+    *before, mesh = meshes
+    polished = simulator.polish(mesh)
+    if not before or not simulator.docked(before[-1], polished):
+        return polished
+    worth = [simulator.final_score(m).total - simulator.docked(before[-1], m) for m in (polished, mesh)]
+    return polished if worth[0] >= worth[1] else mesh
 
 
 def _transitions_of(

@@ -11,7 +11,7 @@ import typer
 
 from autopoly_env.errors import AutoPolyError, ConfigError
 
-DEFAULT_AGENT = "climb"
+DEFAULT_AGENT = "mcts"
 USAGE_ERROR, FAILURE = 2, 1
 
 HELP = """Build a polygon mesh of every silhouette and tell how, action by action.
@@ -58,7 +58,7 @@ def solve(
         str,
         typer.Option(
             help="Who builds: climb, trace, mcts, mcts_paper, nfap-prior, nfap-mcts, decimate, beam, greedy, random, "
-            "dr-simple or dr-complex."
+            "oracle, dr-simple or dr-complex."
         ),
     ] = DEFAULT_AGENT,
     operators: Annotated[str, typer.Option(help="paper, full, or operators, separated by commas.")] = "full",
@@ -72,6 +72,10 @@ def solve(
         typer.Option(help="Time for an image; results then depend on the machine.", show_default="none"),
     ] = None,
     refits: Annotated[int | None, typer.Option(help="Limit of refits an image.", show_default="none")] = None,
+    simulations: Annotated[
+        int | None,
+        typer.Option(help="Limit of simulations an image, for agents that search a tree.", show_default="none"),
+    ] = None,
     seed: Annotated[int, typer.Option(help="Of the agents that draw random numbers.")] = 0,
     option: Annotated[
         list[str] | None, typer.Option(metavar="KEY=VALUE", help="An option of the agent; may be repeated.")
@@ -104,7 +108,7 @@ def solve(
     from autopoly_env.score import ScoreWeights
 
     weights = ScoreWeights(w_sm, w_sc, w_si)
-    budget = Budget(refits, seconds)
+    budget = Budget(refits, seconds, simulations)
     wishes = read_wishes(importance, start, lock, symmetry)
     options = _parse_options(option or [])
     settings = Settings(agent, options, seed, operators, resolution, max_steps, weights, budget, wishes)

@@ -66,6 +66,8 @@ class Report:
     def progress(self, progress: base.Progress) -> None:
         """An agent has come this far with it."""
         text = f"{self._name}  r_all {progress.best_total:.2f}, {progress.n_refits} refits"
+        if progress.n_nodes:
+            text += f", tree of {progress.n_nodes}"
         self._bar.update(self._task, description=text)
 
     def solved(self, result: Result) -> None:

@@ -46,6 +46,8 @@ class Settings:
         wishes = replace(wishes, importance=None)  # so is whether it has the image's proportions
         dummy = replace(self, wishes=wishes).simulator(Silhouette(np.ones((1, 1), np.bool_)))
         check_guidance(agent, dummy.guidance.names)
+        if self.budget.simulations is not None and not agent.runs_simulations:
+            raise ConfigError(f"{self.agent} runs no simulations to limit: give --refits or --seconds instead")
         n_threads()
 
     def new_agent(self) -> Agent:

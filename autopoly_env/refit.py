@@ -12,7 +12,7 @@ each pixel times its weight where the target has weights.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -24,7 +24,7 @@ from autopoly_env.mesh import PolyMesh, Topology
 from autopoly_env.parallel import map_threads
 from autopoly_env.raster import workspace
 from autopoly_env.refit_kernels import Picture, Settings, Shape, Ties
-from autopoly_env.silhouette import Silhouette
+from autopoly_env.silhouette import Silhouette, Target
 
 
 @dataclass(frozen=True)
@@ -53,10 +53,13 @@ class RefitTarget:
     pictures: tuple[Picture, Picture, Picture, Picture]
 
     @classmethod
-    def of(cls, silhouette: Silhouette, resolution: int) -> "RefitTarget":
-        """Levels R/8, R/4, R/2 and R = `resolution`, none below 8 pixels (or R, if that is less)."""
+    def of(cls, silhouette: Silhouette, resolution: int, background: float = 1.0) -> "RefitTarget":
+        """Levels R/8, R/4, R/2 and R = `resolution`, none below 8 pixels (or R, if that is less).
+
+        `background` is what a pixel outside the silhouette weighs beside one inside.
+        """
         sizes = [max(min(8, resolution), resolution // divisor) for divisor in (8, 4, 2, 1)]
-        targets = [silhouette.target(size) for size in sizes]
+        targets = [_with_background(silhouette.target(size), background) for size in sizes]
         pictures = [Picture(t.coverage, t.row_sum, t.row_square_sum, t.weight_sum) for t in targets]
         return cls((pictures[0], pictures[1], pictures[2], pictures[3]))
 
@@ -73,6 +76,13 @@ class Bonds:
     locked: BoolArray  # (V,) those that a refit leaves where they are, bit for bit
     images: IntArray  # (V,) the mirror image of each boundary vertex, itself on the axis; -1 where there is none
     axis: float = 0.5  # x of the vertical axis of the mirror
+
+
+def holding(bonds: Bonds | None, held: BoolArray) -> Bonds:
+    """`bonds` with the vertices `held` (V,) locked as well; those whose mirror image is free are left free."""
+    if bonds is None:
+        return Bonds(held, np.full(len(held), -1, np.int64))
+    return replace(bonds, locked=bonds.locked | held & ((bonds.images < 0) | held[bonds.images]))
 
 
 @dataclass(frozen=True)
@@ -116,6 +126,13 @@ def refit(
         moved,
     )
     return RefitResult(mesh.with_vertices(moved), before, after, n_evaluations)
+
+
+def _with_background(target: Target, background: float) -> Target:
+    if background == 1.0:
+        return target
+    weights = target.coverage + background * (1.0 - target.coverage)
+    return Target(target.coverage, weights if target.weights is None else weights * target.weights)
 
 
 def refit_many(meshes: Iterable[PolyMesh], target: RefitTarget, config: RefitConfig = DEFAULT) -> list[RefitResult]:

@@ -13,22 +13,27 @@ import numpy as np
 import shapely
 
 from autopoly_env.actions import STOP, Action, legal_actions
+from autopoly_env.arrays import BoolArray
 from autopoly_env.edits import Choice
 from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.guidance import Guidance, importance_settings
 from autopoly_env.importance import ImportanceSource, weighted
+from autopoly_env.lesson import share_moved
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.mirror import Beginning, Halfway, mirrored_starts
 from autopoly_env.operators import preset
 from autopoly_env.parallel import map_threads
 from autopoly_env.placement import Disagreement, defects_of, leaves_outline_alone, starts
-from autopoly_env.refit import FROM_AFAR, LOCAL, THOROUGH, RefitConfig, RefitTarget, refit
+from autopoly_env.refit import FROM_AFAR, LOCAL, THOROUGH, RefitConfig, RefitTarget, holding, refit
 from autopoly_env.routines import Job, Routine, run
 from autopoly_env.score import Score, ScoreWeights, score
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import Silhouette
+from autopoly_env.tuning import tune
 
 POLISH_RESOLUTION = 512  # of the finest refit; a score may be finer
+_N_POLISHED = 3  # refits at it, each towards more than the IoU of the one before
+_BACKGROUND_STEPS = 16  # between weights 0 and 1, so that few targets are prepared
 
 
 @dataclass(frozen=True)
@@ -36,7 +41,7 @@ class State:
     """A shape on the way, and how it came from the one before."""
 
     mesh: PolyMesh
-    score: Score
+    score: Score  # what the step that made it is docked under `w_locality` is off its total
     step: int = 0
     done: str = ""  # why it is over: "stop", "matched", "max_steps"; empty while it goes on
     action: Action | None = None  # what made it, None for an initial state
@@ -91,7 +96,19 @@ class Simulator:
         self.max_steps = max_steps
         self.match_threshold = match_threshold
         self._target = self.silhouette.target(resolution)
-        self._refit_target = RefitTarget.of(self.silhouette, resolution)
+        self._refit_targets: dict[tuple[int, float], RefitTarget] = {}
+
+    def refit_target(self, iou: float, resolution: int | None = None) -> RefitTarget:
+        """What a mesh of that IoU is refitted to, at the simulator's resolution or another one.
+
+        Least squares with a background that weighs as much as the IoU makes the IoU larger wherever it can be larger
+        (Dinkelbach 1967): a pixel more is worth it where its chance of being filled is above IoU / (1 + IoU).
+        """
+        size = resolution or self.resolution
+        background = round(iou * _BACKGROUND_STEPS) / _BACKGROUND_STEPS
+        if (size, background) not in self._refit_targets:
+            self._refit_targets[size, background] = RefitTarget.of(self.silhouette, size, background)
+        return self._refit_targets[size, background]
 
     def settings(self) -> dict[str, Any]:
         """The rules as plain values, as a construction sequence keeps them."""
@@ -120,7 +137,7 @@ class Simulator:
         if mesh is not None:
             self.guidance.check_symmetric(mesh)
             return self._ended(State(mesh, self.score(mesh), n_refits=0))
-        fits = yield [self._refit_job(box, FROM_AFAR) for box in self._bounding_boxes()]
+        fits = yield [self._refit_job(box, FROM_AFAR, 1.0) for box in self._bounding_boxes()]
         best = max((fit.mesh for fit in fits), key=lambda fit: self.score(fit).total)
         return self._ended(State(best, self.score(best), n_refits=len(fits)))
 
@@ -147,12 +164,22 @@ class Simulator:
                 corners = corners[::-1]
             yield PolyMesh.from_faces(corners, [(0, 1, 2, 3)])
 
-    def score(self, mesh: PolyMesh) -> Score:
-        """What a mesh is worth at the simulator's resolution."""
-        return score(mesh, self._target, self.weights)
+    def score(self, mesh: PolyMesh, before: PolyMesh | None = None) -> Score:
+        """What a mesh is worth at the simulator's resolution; as the result of a step from `before`, if that is given.
+
+        Then `docked` is taken off the total, by which agents choose.
+        """
+        worth = score(mesh, self._target, self.weights)
+        off = 0.0 if before is None else self.docked(before, mesh)
+        return replace(worth, total=worth.total - off) if off else worth
+
+    def docked(self, before: PolyMesh, after: PolyMesh) -> float:
+        """What the weight `w_locality` costs a step, in points of r_all: for moving vertices that were there before."""
+        weight = self.weights.w_locality
+        return weight * share_moved(before, after) if weight else 0.0
 
     def final_score(self, mesh: PolyMesh) -> Score:
-        """What a mesh is worth at the silhouette's own resolution."""
+        """What a mesh is worth at the silhouette's own resolution: the paper's r_all, whatever led to it."""
         return score(mesh, self.silhouette.target(self.silhouette.resolution), self.weights)
 
     def legal_actions(self, state: State) -> list[Action]:
@@ -228,14 +255,30 @@ class Simulator:
             choice, mesh, halfway = begin[0]
             n_refits = 0
         else:
-            fits = yield [self._refit_job(mesh, THOROUGH) for _, mesh, _ in begin]
+            fits = yield [self._refit_job(mesh, THOROUGH, state.score.iou) for _, mesh, _ in begin]
             k = min(range(len(fits)), key=lambda k: (sum(defects_of(fits[k].mesh)), fits[k].loss))
-            (choice, _, halfway), mesh, n_refits = begin[k], fits[k].mesh, len(fits)
-        after = State(mesh, self.score(mesh), state.step + 1, "", action, choice, n_refits, halfway)
+            (choice, begun, halfway), mesh, n_refits = begin[k], fits[k].mesh, len(fits)
+            if self.docked(state.mesh, mesh) > 0.0:
+                held = yield from self._held(state, begun)
+                mesh = max((mesh, *held), key=lambda m: (-sum(defects_of(m)), self.score(m, state.mesh).total))
+                n_refits += len(held)
+        after = State(mesh, self.score(mesh, state.mesh), state.step + 1, "", action, choice, n_refits, halfway)
         return self._ended(after)
 
-    def _refit_job(self, mesh: PolyMesh, config: RefitConfig) -> Job:
-        return partial(refit, mesh, self._refit_target, config, self.guidance.bonds(mesh))
+    def _held(self, state: State, begun: PolyMesh) -> Routine[list[PolyMesh]]:
+        """Refits in which old vertices stay: all of them, and all but the ends of edges that the action changed."""
+        old = np.isin(begun.vertex_ids, state.mesh.vertex_ids)
+        jobs = [self._refit_job(begun, THOROUGH, state.score.iou, old)]
+        near = np.isin(begun.vertex_ids, list(_ends_changed(state.mesh, begun)))
+        if (old & near).any():
+            jobs.append(self._refit_job(begun, THOROUGH, state.score.iou, old & ~near))
+        fits = yield jobs
+        return [fit.mesh for fit in fits]
+
+    def _refit_job(self, mesh: PolyMesh, config: RefitConfig, iou: float, held: BoolArray | None = None) -> Job:
+        """A refit of all vertices, or of those that are not `held` (V,)."""
+        bonds = self.guidance.bonds(mesh)
+        return partial(refit, mesh, self.refit_target(iou), config, bonds if held is None else holding(bonds, held))
 
     def _ended(self, state: State) -> State:
         """The state with its end marked, if this is one."""
@@ -246,7 +289,24 @@ class Simulator:
         return state
 
     def polish(self, mesh: PolyMesh) -> PolyMesh:
-        """The mesh refitted at the silhouette's own resolution (at most `POLISH_RESOLUTION`), if that scores better."""
+        """The mesh refitted and tuned at the silhouette's own resolution (at most `POLISH_RESOLUTION`).
+
+        No worse than it was: what does not score better is not taken.
+        """
         size = min(self.silhouette.resolution, POLISH_RESOLUTION)
-        fitted = refit(mesh, RefitTarget.of(self.silhouette, size), LOCAL, self.guidance.bonds(mesh)).mesh
-        return max((mesh, fitted), key=lambda candidate: self.final_score(candidate).total)
+        bonds = self.guidance.bonds(mesh)
+        best, score = mesh, self.final_score(mesh)
+        for _ in range(_N_POLISHED):
+            fitted = refit(best, self.refit_target(score.iou, size), LOCAL, bonds).mesh
+            fitted_score = self.final_score(fitted)
+            if not fitted_score.total > score.total:
+                break
+            best, score = fitted, fitted_score
+        tuned = tune(best, self.silhouette.target(size), bonds)
+        return max((best, tuned), key=lambda candidate: self.final_score(candidate).total)
+
+
+def _ends_changed(before: PolyMesh, after: PolyMesh) -> set[int]:
+    """Ids of the ends of the edges that only one of the meshes has."""
+    pairs = [{frozenset(pair) for pair in np.array(mesh.vertex_ids)[mesh.edges].tolist()} for mesh in (before, after)]
+    return set().union(*(pairs[0] ^ pairs[1]))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from agents.base import Budget, Meter, Progress
+from agents.climb.hill import Hill
 from agents.decimate import DecimateAgent, DecimateConfig, _coarser, _spanned, n_vertices
 from agents.registry import make_agent
 from agents.trace.outline import Outline
@@ -46,7 +47,7 @@ def test_coarser__takes_the_least_visible_vertices_and_whole_rings() -> None:
 def test_outlines__go_down_one_by_one_to_the_coarsest(operators: str, least: int) -> None:
     game = simulator("house", operators=operators)
     agent = DecimateAgent(DecimateConfig(prices=(0.2,)))
-    counts = [n_vertices(outline) for outline in agent.outlines(game, Meter.unlimited())]
+    counts = [n_vertices(place.outline) for place in agent.places(Hill(game), Meter.unlimited())]
     way_down = counts[counts.index(max(counts)) + 2 :]
     assert way_down[-1] == least
     assert all(later - earlier in (-1, 0) for earlier, later in pairwise(way_down))
@@ -121,8 +122,7 @@ def test_act__stops() -> None:
     ("options", "complaint"),
     [
         ({"max_vertices": 3}, "max_vertices 3: expected at least 4"),
-        ({"n_candidates": 0}, "n_candidates and n_finished of at least 1"),
-        ({"n_finished": 0}, "n_candidates and n_finished of at least 1"),
+        ({"n_candidates": 0}, "n_candidates 0: expected at least 1"),
         ({"prices": (2.0, 1.0)}, "prices"),
     ],
 )

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from agents.base import Agent, Budget, Meter, Progress, Track
+from agents.base import Agent, Budget, Decision, Meter, Progress, Solution, Track
 from agents.registry import make_agent
 from agents.search.backup import back_up
 from agents.search.config import PAPER, MctsConfig
 from agents.search.evaluator import ResidualEvaluator, UniformEvaluator
-from agents.search.incumbents import track_of
+from agents.search.incumbents import SHARE, track_of
 from agents.search.mcts import MctsAgent
 from agents.search.search import Search
 from agents.search.selection import best_half, halving_schedule, puct, uct
@@ -479,28 +479,62 @@ def test_act__takes_what_leads_on_and_stops_where_nothing_is_better() -> None:
 def test_seeds__are_never_lost(target: str) -> None:
     game = simulator(target)
     incumbents = [make_agent(name).solve(game) for name in ("trace", "greedy")]
-    agent = make_agent("mcts", seeds=("trace", "greedy"), n_simulations=2, patience=1)
-    solution = agent.solve(game)
+    agent = make_agent("mcts", seeds=("trace", "greedy"), n_simulations=2, patience=1, hop_patience=0)
+    solution = agent.solve(game, Budget(refits=5000))
     assert_consistent(solution, game)
     assert solution.score.total >= max(incumbent.score.total for incumbent in incumbents)
-    n_refits = sum(incumbent.stats.n_refits for incumbent in incumbents)
-    best = max(incumbents, key=lambda incumbent: incumbent.score.total)
-    alone = make_agent("mcts", seeds=("trace", "greedy")).solve(game, Budget(refits=n_refits + 2))
-    assert alone.sequence == best.sequence and alone.score == best.score
 
 
 def test_seeds__do_not_keep_the_search_from_the_rectangle() -> None:
     game = simulator("blobs")
-    pure, both = make_agent("mcts", seeds=()).solve(game), make_agent("mcts", seeds=("trace",)).solve(game)
+    pure, both = (make_agent("mcts", seeds=seeds, hop_patience=0).solve(game) for seeds in ((), ("trace",)))
     assert both.score.total >= pure.score.total
     assert both.stats.n_refits >= pure.stats.n_refits + make_agent("trace").solve(game).stats.n_refits
 
 
-def test_seeds__share_the_budget() -> None:
+def test_seeds__get_a_share_of_what_is_left_of_the_budget() -> None:
+    game, asked = simulator("blobs"), []
+
+    class Spy(Agent):
+        def act(self, simulator: Simulator, state: State) -> Decision:
+            return Decision(STOP)
+
+        def solve(self, simulator: Simulator, budget: Budget | None = None, on_progress: Any = None) -> Solution:
+            asked.append(budget)
+            return make_agent("trace").solve(simulator, budget, on_progress)
+
+    n_initial = 2
+    n_traced = make_agent("trace").solve(game, Budget(refits=59)).stats.n_refits
+    MctsAgent(MctsConfig(), [Spy(), Spy()]).solve(game, Budget(refits=100))
+    rest = 100 - n_initial
+    assert asked == [Budget(refits=round(SHARE * rest)), Budget(refits=round(SHARE * (rest - n_traced)))]
+
+
+def test_seeds__that_cannot_take_guidance_are_left_out() -> None:
+    game = simulator("house", symmetry=0.5)
+    solution = make_agent("mcts", seeds=("climb", "decimate")).solve(game, Budget(refits=60))
+    assert_consistent(solution, game)
+
+
+def test_hop_patience__finds_what_the_tree_does_not() -> None:
     game = simulator("blobs")
-    solution = make_agent("mcts", seeds=("greedy", "beam")).solve(game, Budget(refits=40))
-    assert solution.sequence == make_agent("greedy").solve(game, Budget(refits=38)).sequence
-    assert solution.stats.stopped_by == "refits"
+    alone, hopping = (
+        make_agent("mcts", seeds=("trace",), hop_patience=n).solve(game, Budget(refits=600)) for n in (0, 1000)
+    )
+    assert hopping.score.total > alone.score.total
+
+
+def test_n_refits__limits_a_search_without_a_budget() -> None:
+    game = simulator("blobs")
+    solution = make_agent("mcts", n_refits=100).solve(game)
+    assert 100 <= solution.stats.n_refits < 150 and solution.stats.stopped_by == "refits"
+
+
+def test_simulations__limit_a_search() -> None:
+    game, seen = simulator("blobs"), []
+    solution = make_agent("mcts", seeds=()).solve(game, Budget(simulations=3), seen.append)
+    assert solution.stats.stopped_by == "simulations"
+    assert 3 <= seen[-1].n_nodes <= 3 * MctsConfig().n_expanded
 
 
 @pytest.mark.parametrize("target", TARGETS)

@@ -107,7 +107,7 @@ def test_solve__records_a_sequence_that_replays_to_the_mesh(run: Run) -> None:
     mesh = sequence.final()
     assert len(sequence.steps) == record["actions"] > 0
     assert sequence.settings == record["settings"]
-    assert (sequence.settings["agent"], sequence.settings["seed"]) == ("climb", 7)
+    assert (sequence.settings["agent"], sequence.settings["seed"]) == ("mcts", 7)
     assert np.allclose(read_obj(record["files"]["mesh.obj"])[0], mesh.vertices)
     target = load_silhouette(EXAMPLES / "mug.png").target(512)
     assert score(mesh, target, ScoreWeights()).total == record["r_all"] == sequence.steps[-1].score["total"]
@@ -213,8 +213,8 @@ def test_max_steps_and_refits__limit_the_work(run: Run) -> None:
         (["box.png", "--refits", "-1"], "a budget of -1 refits"),
         (["box.png", "--max-steps", "-1"], "max_steps -1"),
         (["box.png", "--option", "width"], "expected key=value"),
-        (["box.png", "--option", "name=3"], "agent 'climb' has no option 'name'"),
-        (["box.png", "--option", "width=3"], "agent 'climb' has no option 'width'"),
+        (["box.png", "--option", "name=3"], "agent 'mcts' has no option 'name'"),
+        (["box.png", "--option", "width=3"], "agent 'mcts' has no option 'width'"),
         (["box.png", "--agent", "beam", "--option", "width=wide"], "option width"),
         (["box.png", "--agent", "beam", "--option", "width=0"], "width"),
         (["box/steps.png", "box.png", "--out", "."], "would overwrite the image box/steps.png"),
@@ -427,6 +427,14 @@ def test_ctrl_c_in_the_shell__leaves_finished_images_whole() -> None:
             record["F"],
         )
     assert not list(Path("out").rglob("*.tmp"))
+
+
+def test_simulations__limit_a_tree_search_and_are_refused_by_others(run: Run) -> None:
+    image = small_image("box.png")
+    done = run(image, "--agent", "mcts", "--option", "seeds=[]", "--simulations", 0, "--json")
+    assert json.loads(done.out)["stopped_by"] == "simulations"
+    refused = run(image, "--agent", "trace", "--simulations", 3)
+    assert refused.code == 2 and "trace runs no simulations" in refused.err
 
 
 # The help

@@ -10,7 +10,7 @@ from autopoly_env.errors import ConfigError
 class MctsConfig:
     """How `mcts` searches."""
 
-    seeds: tuple[str, ...] = ("climb",)  # agents whose best shape it goes on from, before it begins at the rectangle
+    seeds: tuple[str, ...] = ("climb", "decimate")  # agents whose best shape it goes on from before the rectangle
     n_simulations: int = 16  # before a step is committed
     prior: Literal["residual", "uniform"] = "residual"
     formula: Literal["puct", "uct"] = "puct"
@@ -26,10 +26,13 @@ class MctsConfig:
     reuse_tree: bool = True  # keep what is below the child that is taken
     merge: bool = True  # do not go on from a shape that the tree has already
     patience: int = 4  # committed steps in a row that may fail to improve the best shape
+    hop_patience: int = 20  # hops in a row, from outline to outline, that may; 0: the search ends with the tree
+    n_refits: int = 1500  # where the budget sets no limit
     seed: int = 0
 
     def __post_init__(self) -> None:
         least = {"n_simulations": 1, "n_expanded": 1, "patience": 1, "n_rollout": 0, "exploration": 0.0, "seed": 0}
+        least |= {"hop_patience": 0, "n_refits": 0}
         for name, bound in least.items():
             if not getattr(self, name) >= bound:
                 raise ConfigError(f"{name} = {getattr(self, name)}: expected at least {bound}")
@@ -53,4 +56,5 @@ PAPER = MctsConfig(
     backup="mean",
     reuse_tree=False,
     merge=False,
+    hop_patience=0,
 )

@@ -10,12 +10,19 @@ from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence_ids import choice_indices, element_index
 from autopoly_env.simulator import Simulator
 
+SHARE = 0.6  # of what is left of the budget, that an incumbent may use
+
 
 def play(agents: Sequence[Agent], simulator: Simulator, meter: Meter) -> Iterator[Solution]:
-    """The agents' solutions, as far as the budget goes. Raises KeyboardInterrupt after one that was interrupted."""
+    """The agents' solutions, as far as the budget goes. Raises KeyboardInterrupt after one that was interrupted.
+
+    Agents that cannot take the simulator's guidance are left out.
+    """
     for agent in agents:
         if meter.spent():
             return
+        if simulator.guidance.names and not agent.takes_guidance:
+            continue
         solution = _solve_within(agent, simulator, meter)
         yield solution
         if solution.stats.stopped_by == "interrupted":
@@ -31,7 +38,8 @@ def _solve_within(agent: Agent, simulator: Simulator, meter: Meter) -> Solution:
         n_new, n_counted = progress.n_refits - n_counted, progress.n_refits
         meter.count(n_new, progress.best_total)
 
-    return agent.solve(simulator, meter.rest(), report)
+    budget = replace(meter.rest().share(SHARE), simulations=None)
+    return agent.solve(simulator, budget, report)
 
 
 def track_of(simulator: Simulator, sequence: ConstructionSequence) -> Track:

@@ -9,6 +9,9 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from agents.base import Agent, Budget, Decision, Meter, Progress, Solution, Track, finish
+from agents.climb.hill import Hill
+from agents.climb.hop import hop
+from agents.climb.tops import Tops
 from agents.search.config import MctsConfig
 from agents.search.evaluator import Evaluator, ResidualEvaluator, UniformEvaluator
 from agents.search.incumbents import play, track_of
@@ -17,6 +20,7 @@ from agents.search.tree import Node
 from autopoly_env.actions import STOP
 from autopoly_env.simulator import Simulator, State
 
+_TREE_SHARE = 0.25  # of what is left of the budget, that a tree may use where the search goes on among outlines
 _EVALUATORS: dict[str, type[UniformEvaluator]] = {"residual": ResidualEvaluator, "uniform": UniformEvaluator}
 
 
@@ -27,6 +31,7 @@ class MctsAgent(Agent):
     """
 
     name = "mcts"
+    runs_simulations = True
 
     def __init__(
         self, config: MctsConfig, incumbents: Sequence[Agent] = (), evaluator: Evaluator | None = None
@@ -51,9 +56,11 @@ class MctsAgent(Agent):
         budget: Budget | None = None,
         on_progress: Callable[[Progress], None] | None = None,
     ) -> Solution:
-        """As every agent; never worse than the incumbents, whose sequences are returned as they are."""
-        meter = Meter(budget or Budget(), on_progress)
+        """As every agent; never worse than the incumbents. A budget without limits is one of `config.n_refits`."""
+        unlimited = budget is None or budget == Budget()
+        meter = Meter(Budget(self._config.n_refits) if unlimited or budget is None else budget, on_progress)
         incumbents: list[Solution] = []
+        tops = Tops(Hill(simulator)) if self._hops(simulator) else None
         initial = best = Track(simulator.initial())
         try:
             meter.add([best.state])
@@ -61,13 +68,26 @@ class MctsAgent(Agent):
                 incumbents.append(solution)
                 best = _better(best, track_of(simulator, solution.sequence))
             for start in [best] if best is initial else [best, initial]:
-                for track in self._search(simulator, start, meter):
+                part = meter.part(1.0 if tops is None else _TREE_SHARE)
+                for track in self._search(simulator, start, part):
                     best = _better(best, track)
+            if tops is not None:
+                for mesh in (best.state.mesh, *(solution.mesh for solution in incumbents)):
+                    tops.add_mesh(mesh)
+                rng = np.random.default_rng(self._config.seed)
+                for top in hop(tops.hill, tops.places(), self._config.hop_patience, rng, meter):
+                    tops.add(top)
         except KeyboardInterrupt:
             meter.stopped_by = "interrupted"
         found = [*incumbents, finish(simulator, best.states(), meter)]
+        if tops is not None and tops.places():
+            found.append(finish(simulator, tops.built(), meter))
         chosen = max(found, key=lambda solution: solution.score.total)
         return Solution(chosen.sequence, chosen.mesh, chosen.score, meter.stats())
+
+    def _hops(self, simulator: Simulator) -> bool:
+        """Whether the search goes on among outlines, which heed no guidance."""
+        return self._config.hop_patience > 0 and not simulator.guidance.names
 
     def _search(self, simulator: Simulator, track: Track, meter: Meter) -> Iterator[Track]:
         """Search, commit, and so on; yield every track that is the best so far."""

@@ -117,6 +117,7 @@ class Search:
         made = [Node(Track(s, node.track), node, batch[s.action]) for s in states if s.action and self._is_new(s)]
         node.children += made
         yield from (child.track for child in made)
+        meter.add_simulation(len(made))
         meter.add(states)
         return made
 

@@ -18,7 +18,7 @@ from agents.trace.reach import Reach
 from agents.trace.rings import Ring, signed_area, trace_rings
 from agents.trace.simplify import Contour
 from autopoly_env.errors import ConfigError
-from autopoly_env.refit import LOCAL, THOROUGH, RefitTarget
+from autopoly_env.refit import LOCAL, THOROUGH
 from autopoly_env.score import ScoreWeights
 from autopoly_env.simulator import Simulator, State
 
@@ -62,19 +62,20 @@ class TraceAgent(WholeAgent):
 
     def outlines(self, simulator: Simulator, meter: Meter) -> Iterator[Outline]:
         """All outlines of the sweep that can be built, each refitted in two ways and then as it was."""
-        target = RefitTarget.of(simulator.silhouette, simulator.resolution)
-        reach = Reach.of(simulator)
-        for outline in self._sweep(simulator, trace_rings(simulator.silhouette), reach):
+        pixels = simulator.silhouette.target(simulator.resolution)
+        for outline in self.sweep(simulator, trace_rings(simulator.silhouette)):
             if meter.spent():
                 return
+            target = simulator.refit_target(outline.score(pixels, simulator.weights).iou)
             found = [*(outline.refitted(target, config) for config in _REFITS), outline]
             meter.count(len(_REFITS), max(final_total(simulator, o) for o in found))
             yield from found
 
-    def _sweep(self, simulator: Simulator, rings: Sequence[Ring], reach: Reach) -> Iterator[Outline]:
-        """Outlines from cheap to dear vertices; past the last price on, until one can be built."""
+    def sweep(self, simulator: Simulator, rings: Sequence[Ring]) -> Iterator[Outline]:
+        """Polygons of the rings from cheap to dear vertices; past the last price on, until one can be built."""
         if not rings:
             return
+        reach = Reach.of(simulator)
         contours = [Contour(ring.points) for ring in rings]
         area = float(simulator.silhouette.mask.mean())
         prices = self._config.prices

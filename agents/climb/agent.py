@@ -1,0 +1,98 @@
+"""`climb`: hill climbing on outlines, from the best that tracing and greedy search have found.
+
+Of two meshes with the same outline the score prefers the one with fewer inner edges, so the search moves among outlines
+(rings of vertices) and builds a mesh only in the end. Every neighbour of an outline is refitted before it is judged.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from agents.base import Meter, Solution, WholeAgent, finish
+from agents.beam import BeamAgent, BeamConfig
+from agents.climb.hill import LEAST_GAIN, Hill, Place, total_of
+from agents.climb.moves import neighbours, relocations
+from agents.climb.tops import Tops
+from agents.trace.agent import TraceAgent, TraceConfig
+from autopoly_env.refit import LOCAL, THOROUGH
+from autopoly_env.simulator import Simulator
+
+
+@dataclass(frozen=True)
+class ClimbConfig:
+    """How `climb` searches."""
+
+    n_seeds: int = 3  # traced outlines of different sizes to climb from, the best first
+    with_greedy: bool = True  # climb from what greedy search finds, too
+    n_blamed: int = 8  # edges to add vertices to, those with most blame
+    n_thorough: int = 4  # neighbours that are refitted again, harder, before a top is taken for one
+    n_relocated: int = 3  # edges that a vertex may be moved to from elsewhere when nothing simpler improves
+    n_rounds: int = 60
+
+
+class ClimbAgent(WholeAgent):
+    """Traces and searches greedily, then climbs from each result; returns the best."""
+
+    name = "climb"
+
+    def __init__(self, config: ClimbConfig) -> None:
+        self._config = config
+
+    def _find(self, simulator: Simulator, meter: Meter) -> Solution:
+        tops = Tops(Hill(simulator))
+        candidates = []
+        try:
+            for seed in self._traced(tops.hill, meter):
+                tops.add(seed)
+                for place in climb(tops.hill, seed, self._config, meter):
+                    tops.add(place)
+            if self._config.with_greedy and not meter.spent():
+                solution = BeamAgent(BeamConfig(width=1)).solve(simulator, meter.rest())
+                candidates.append(solution)
+                meter.count(solution.stats.n_refits, solution.score.total)
+                if solution.stats.stopped_by == "interrupted":
+                    raise KeyboardInterrupt
+                seed_or_none = tops.add_mesh(solution.mesh)
+                if seed_or_none is not None:
+                    for place in climb(tops.hill, seed_or_none, self._config, meter):
+                        tops.add(place)
+        except KeyboardInterrupt:
+            meter.stopped_by = "interrupted"
+        if tops.places():
+            candidates.append(finish(simulator, tops.built(), meter))
+        if not candidates:
+            return finish(simulator, [simulator.initial()], meter)
+        best = max(candidates, key=lambda candidate: candidate.score.total)
+        return Solution(best.sequence, best.mesh, best.score, meter.stats())
+
+    def _traced(self, hill: Hill, meter: Meter) -> Iterator[Place]:
+        sizes: set[int] = set()
+        places = map(hill.place, list(TraceAgent(TraceConfig()).outlines(hill.simulator, meter)))
+        for place in sorted(places, key=lambda place: -place.total):
+            if place.score.complexity not in sizes and len(sizes) < self._config.n_seeds and not meter.spent():
+                sizes.add(place.score.complexity)
+                yield place
+
+
+def climb(hill: Hill, place: Place, config: ClimbConfig, meter: Meter) -> Iterator[Place]:
+    """Move to the best neighbour while one is better, looking harder before giving up; yield every place on the way."""
+    for _ in range(config.n_rounds):
+        if meter.spent():
+            return
+        silhouette, iou, allows = hill.simulator.silhouette, place.score.iou, hill.reach.allows
+        found = neighbours(place.outline, silhouette, hill.contours, config.n_blamed, holes=hill.reach.holes)
+        places = hill.fit(meter.affordable(filter(allows, found)), LOCAL, iou)
+        n_fits = len(places)
+        best = max(places, key=total_of, default=place)
+        if best.total <= place.total + LEAST_GAIN:
+            hopeful = sorted(places, key=total_of, reverse=True)[: config.n_thorough]
+            places = hill.fit([*(p.outline for p in hopeful), place.outline], THOROUGH, iou)
+            moved = [o for o in relocations(place.outline, silhouette, config.n_relocated) if allows(o)]
+            places += hill.fit(moved, LOCAL, iou)
+            n_fits += len(places)
+            best = max(places, key=total_of)
+        if best.total <= place.total + LEAST_GAIN:
+            meter.count(n_fits, place.total)
+            return
+        place = best
+        yield place
+        meter.count(n_fits, place.total)

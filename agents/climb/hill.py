@@ -1,0 +1,54 @@
+"""The landscape that an outline climbs in: what each outline is worth, and how it is refitted before it is judged."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from agents.trace.outline import Outline
+from agents.trace.reach import Reach
+from agents.trace.rings import trace_rings
+from autopoly_env.parallel import map_threads
+from autopoly_env.refit import RefitConfig
+from autopoly_env.score import Score
+from autopoly_env.simulator import POLISH_RESOLUTION, Simulator
+
+LEAST_GAIN = 1e-9  # of r_all, below which a place is no better than another
+
+
+class Place(NamedTuple):
+    """An outline, and what it is worth."""
+
+    outline: Outline
+    score: Score
+
+    @property
+    def total(self) -> float:
+        return self.score.total
+
+
+class Hill:
+    """The landscape of one target: r_all at the silhouette's own resolution (at most `POLISH_RESOLUTION`)."""
+
+    def __init__(self, simulator: Simulator) -> None:
+        self.simulator = simulator
+        self.contours = trace_rings(simulator.silhouette)
+        self.reach = Reach.of(simulator)
+        self.finest = min(POLISH_RESOLUTION, simulator.silhouette.resolution)
+        self._pixels = simulator.silhouette.target(self.finest)
+
+    def place(self, outline: Outline) -> Place:
+        """The outline as it is."""
+        return Place(outline, outline.score(self._pixels, self.simulator.weights))
+
+    def fit(self, outlines: Sequence[Outline], config: RefitConfig, iou: float) -> list[Place]:
+        """Each outline refitted, on all cores, on the way to more than `iou`."""
+        target = self.simulator.refit_target(iou)
+        return map_threads(lambda outline: self.place(outline.refitted(target, config)), outlines)
+
+    def polished(self, place: Place) -> Place:
+        """The outline refitted and tuned as a finished mesh is (`Simulator.polish`)."""
+        return self.place(place.outline.moved(self.simulator.polish(place.outline.loops)))
+
+
+def total_of(place: Place) -> float:
+    """r_all of a place, to sort by."""
+    return place.total

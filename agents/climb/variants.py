@@ -1,0 +1,26 @@
+"""Silhouettes with their thin parts gone or their narrow gaps filled: other topologies to begin with."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from skimage.morphology import isotropic_closing, isotropic_opening
+
+from autopoly_env.silhouette import Silhouette
+
+_RADII = (0.012, 0.025, 0.04, 0.06)  # unit square
+_RESOLUTION = 256  # pixels a side that are enough to see them by
+
+
+def variants(silhouette: Silhouette) -> Iterator[Silhouette]:
+    """Openings and closings of the silhouette by growing discs, each that differs from the one before."""
+    size = min(_RESOLUTION, silhouette.resolution)
+    mask = silhouette.target(size).mask
+    margin = int(np.ceil(_RADII[-1] * size)) + 1  # so that the border of the picture is no border of the shape
+    padded = np.pad(mask, margin)
+    for change in (isotropic_opening, isotropic_closing):
+        last = mask
+        for radius in _RADII:
+            changed = change(padded, radius * size)[margin:-margin, margin:-margin]
+            if changed.any() and not np.array_equal(changed, last):
+                yield Silhouette(changed, silhouette.name)
+            last = changed
