@@ -397,7 +397,10 @@ def test_make_targets__gives_the_source_with_its_options() -> None:
 
 
 WRONG = {
-    "a name that is none": (lambda: make_targets("cosntruction"), "construction, objects, shapenet or the path of a folder"),
+    "a name that is none": (
+        lambda: make_targets("cosntruction"),
+        "construction, objects, shapenet or the path of a folder",
+    ),
     "an unknown option": (lambda: make_targets("objects", family="mug"), "families, resolution"),
     "an option for a folder": (lambda: make_targets(ROOT / "examples", resolution=64), "no options"),
     "an unknown split": (lambda: split_seed("validation", 0), "train or test"),

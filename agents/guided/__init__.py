@@ -1,0 +1,1 @@
+"""Search guided by networks: the paper's nFAP-Net and WarpNet, and the evaluators that bring them into the search."""

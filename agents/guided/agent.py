@@ -1,0 +1,108 @@
+"""`nfap-prior` and `nfap-mcts`: the tree search with networks in it."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from agents.base import Agent, Decision, Meter, Track
+from agents.guided.config import NfapMctsConfig, NfapPriorConfig
+from agents.search.mcts import MctsAgent
+from autopoly_env.actions import STOP
+from autopoly_env.errors import ConfigError
+from autopoly_env.parallel import n_threads
+from autopoly_env.simulator import Simulator, State
+
+if TYPE_CHECKING:
+    from agents.guided.evaluator import NfapEvaluator
+
+
+class NfapPriorAgent(MctsAgent):
+    """Tree search with nFAP-Net's priors and exact refits."""
+
+    name = "nfap-prior"
+
+
+class NfapMctsAgent(Agent):
+    """The paper's search with learning: a tree for every step, grown with the networks; the step itself is refitted."""
+
+    name = "nfap-mcts"
+
+    def __init__(self, config: NfapMctsConfig, evaluator: "NfapEvaluator") -> None:
+        self._config, self._evaluator = config, evaluator
+        self._searcher = MctsAgent(replace(config, seeds=()), (), evaluator)
+
+    def act(self, simulator: Simulator, state: State) -> Decision:
+        """Search a tree of its own from `state`; STOP where nothing in it is better, by WarpNet's measure."""
+        return self._searcher.act(simulator, state)
+
+    def _search(self, simulator: Simulator, track: Track, meter: Meter) -> Iterator[Track]:
+        """Search, commit the step with an exact refit, and so on.
+
+        A warp is less good than a refit, so the tree may hold nothing better although there is something: then the
+        likeliest action is taken, until `patience` steps in a row have not improved the best shape.
+        """
+        best_total, failures = track.state.score.total, 0
+        while not track.state.done and failures < self._config.patience and not meter.spent():
+            following = self._step(simulator, track.state)
+            if following is None:
+                return
+            meter.add([following])
+            track = Track(following, track)
+            yield track
+            failures += 1
+            if track.state.score.total > best_total:
+                best_total, failures = track.state.score.total, 0
+
+    def _step(self, simulator: Simulator, state: State) -> State | None:
+        """The state to go on from; None where nothing can be done."""
+        chosen = self.act(simulator, state).action
+        candidates = [chosen]
+        if chosen == STOP:
+            legal = simulator.legal_actions(state)[1:]
+            prior = self._evaluator.prior(simulator, state, legal) if legal else np.empty(0)
+            candidates = [legal[k] for k in np.argsort(-prior, kind="stable")]
+        return next((made for action in candidates for made in simulator.transition_all(state, [action])), None)
+
+
+def nfap_prior(config: NfapPriorConfig, incumbents: Sequence[Agent] = ()) -> Agent:
+    """The agent of a config; `incumbents` are the agents that it names as seeds. Raises ConfigError as `load_nfap`."""
+    _require_torch("nfap-prior")
+    from agents.guided.evaluator import NfapEvaluator
+    from agents.guided.weights import load_nfap
+
+    net, meta = load_nfap(config.nfap_weights)
+    _check_n(config, net.config.n)
+    return NfapPriorAgent(config, incumbents, NfapEvaluator(net, meta, config.temperature))
+
+
+def nfap_mcts(config: NfapMctsConfig) -> Agent:
+    """As `nfap_prior`; seeds it has none."""
+    _require_torch("nfap-mcts")
+    from agents.guided.evaluator import WarpEvaluator
+    from agents.guided.weights import load_nfap, load_warpnet
+
+    net, meta = load_nfap(config.nfap_weights)
+    _check_n(config, net.config.n)
+    warp, _ = load_warpnet(config.warpnet_weights)
+    evaluator = WarpEvaluator(net, meta, warp, config.temperature, config.start == "placed")
+    return NfapMctsAgent(config, evaluator)
+
+
+def _require_torch(name: str) -> None:
+    """Raise ConfigError where the packages that the networks need are missing; keep torch to this process's threads."""
+    try:
+        import safetensors  # noqa: F401
+        import torch
+    except ImportError as error:
+        missing = f"agent {name!r} needs the package {error.name}, which is not installed"
+        raise ConfigError(f"{missing}: pip install -e '.[learn]' in the checkout") from None
+    torch.set_num_threads(n_threads())
+
+
+def _check_n(config: NfapPriorConfig, n: int) -> None:
+    if config.n != n:
+        raise ConfigError(
+            f"n = {config.n}: the weights foresee {n} stages; give n={n} or the weights of another network"
+        )

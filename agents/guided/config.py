@@ -1,0 +1,115 @@
+"""What the networks and the agents that use them can be told; nothing here needs torch.
+
+Letters: S pixels a side of a network's pictures, n stages of nFAP-Net, K operator classes, M x M grid of WarpNet.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from agents.search.config import MctsConfig
+from autopoly_env.actions import STOP, Action
+from autopoly_env.edits import HOLE_SIDES
+from autopoly_env.errors import ConfigError
+from autopoly_env.operators import OPERATORS
+
+Input = Literal["current", "target", "difference", "edges", "vertices"]
+Regions = Literal["one", "each"]
+
+# What the action head tells apart: stopping, and every operator; a hole of 3 and one of 4 corners are two.
+CLASSES = (
+    "stop",
+    *(
+        name
+        for operator in OPERATORS.values()
+        for name in (
+            [f"{operator.name}_{sides}" for sides in HOLE_SIDES] if operator.element == "hole" else [operator.name]
+        )
+    ),
+)
+_CLASS_OF_NAME = {name: k for k, name in enumerate(CLASSES)}
+STOP_CLASS = 0
+
+
+def class_of(action: Action) -> int:
+    """The index in CLASSES of what an action does."""
+    if action == STOP:
+        return STOP_CLASS
+    if OPERATORS[action.operator].element == "hole":
+        return _CLASS_OF_NAME[f"{action.operator}_{HOLE_SIDES[action.element % len(HOLE_SIDES)]}"]
+    return _CLASS_OF_NAME[action.operator]
+
+
+def _check_network(size: int, widths: tuple[int, ...], feature: int) -> None:
+    if size not in (32, 64, 128):
+        raise ConfigError(f"image_size {size}: expected 32, 64 or 128 pixels a side")
+    if len(widths) != 4 or min(widths) < 4:
+        raise ConfigError(f"widths {widths}: expected four numbers of channels of at least 4")
+    if feature < 8:
+        raise ConfigError(f"feature {feature}: expected at least 8 numbers")
+
+
+@dataclass(frozen=True)
+class NfapConfig:
+    """nFAP-Net. The defaults are the paper's, where it says anything."""
+
+    n: int = 3  # stages: actions that are foreseen
+    image_size: int = 64  # S
+    inputs: tuple[Input, ...] = ("current", "target")  # channels of the picture
+    feature: int = 128  # numbers in the encoder's feature and in the LSTM's state
+    widths: tuple[int, int, int, int] = (16, 32, 48, 64)  # channels at S/2, S/4, S/8, S/16
+    skips: bool = False  # the decoders see the encoder's feature maps, too
+    regions: Regions = "one"  # action-region images a stage: one, or one for each operator class
+    residual: bool = False  # the prior is a learned correction of the residual prior, not the networks' alone
+
+    def __post_init__(self) -> None:
+        _check_network(self.image_size, self.widths, self.feature)
+        if not 1 <= self.n <= 16:
+            raise ConfigError(f"n {self.n}: expected 1 to 16 stages")
+        if not self.inputs or len(set(self.inputs)) < len(self.inputs):
+            raise ConfigError(f"inputs {self.inputs}: expected at least one channel and none twice")
+
+
+@dataclass(frozen=True)
+class WarpConfig:
+    """WarpNet. The paper leaves M open."""
+
+    image_size: int = 64  # S
+    grid: int = 6  # M
+    feature: int = 128
+    widths: tuple[int, int, int, int] = (16, 32, 48, 64)
+
+    def __post_init__(self) -> None:
+        _check_network(self.image_size, self.widths, self.feature)
+        if not 2 <= self.grid <= 16:
+            raise ConfigError(f"grid {self.grid}: expected 2 to 16 control points a side")
+
+
+@dataclass(frozen=True)
+class NfapPriorConfig(MctsConfig):
+    """`nfap-prior`: the search with nFAP-Net's priors and exact refits."""
+
+    seeds: tuple[str, ...] = ()
+    hop_patience: int = 0
+    prior: Literal["nfap"] = "nfap"  # type: ignore[assignment]
+    nfap_weights: str = ""  # a .safetensors file; empty for the one that comes with the project
+    n: int = 3  # stages that the weights must have been trained with
+    temperature: float = 1.0  # of the prior: above 1 it is flatter
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.temperature > 0.0:
+            raise ConfigError(f"temperature = {self.temperature}: expected a number above 0")
+
+
+@dataclass(frozen=True)
+class NfapMctsConfig(NfapPriorConfig):
+    """`nfap-mcts`: the paper's Algorithm 1, refits only where a step is committed."""
+
+    n_rollout: int = 2
+    warpnet_weights: str = ""  # as nfap_weights
+    start: Literal["placed", "plain"] = "placed"  # new vertices begin at the disagreement, or where the operator puts
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.seeds:
+            raise ConfigError(f"seeds {self.seeds}: nfap-mcts begins at the rectangle; leave them out")

@@ -1,0 +1,178 @@
+"""`NfapEvaluator` and `WarpEvaluator`: the networks as what the search is told about states.
+
+A prior is a softmax over the legal actions of `NfapNet.choice_logits`: the predicted operator's probability, shared out
+among its legal elements by what the predicted region image shows at each of them. Where the score has another price of
+complexity than the weights were trained with, every logit is corrected by what the action's elements cost more, which
+for a softmax of r_all over a temperature is exact. Letters: A actions, K operator classes, S pixels a side.
+"""
+
+from collections import OrderedDict
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+import torch
+
+from agents.guided.config import class_of
+from agents.guided.nfap import NfapNet
+from agents.guided.pictures import draw_inputs, rendering
+from agents.guided.regions import action_points
+from agents.guided.warp import WarpNet
+from agents.guided.weights import Meta
+from agents.search.evaluator import ResidualEvaluator
+from autopoly_env.actions import Action
+from autopoly_env.arrays import FloatArray
+from autopoly_env.errors import IllegalActionError
+from autopoly_env.mesh import PolyMesh
+from autopoly_env.operators import OPERATORS, Choice
+from autopoly_env.placement import Disagreement, starts
+from autopoly_env.silhouette import Silhouette
+from autopoly_env.simulator import Simulator, State
+
+_FLOOR = 1e-4  # of the likeliest action, for all
+_BATCH = 16  # states that are evaluated at once at most
+_REMEMBERED = 512  # states whose evaluation is kept
+
+_Said = tuple[torch.Tensor, torch.Tensor]  # operators (1, K) and regions (1, 1 or K, S, S) of stage 1
+
+
+class NfapEvaluator:
+    """nFAP-Net's priors, exact refits: the agent `nfap-prior`."""
+
+    def __init__(self, net: NfapNet, meta: Meta, temperature: float = 1.0) -> None:
+        self._net, self._temperature = net, temperature
+        labels = meta.training.get("labels", {})
+        self._trained_w_sc = float(labels.get("w_sc", 0.3))
+        self._label_temperature = float(labels.get("temperature", 1.0))
+        self._residual = ResidualEvaluator()
+        self._target: Silhouette | None = None  # that the following two are about
+        self._said: OrderedDict[PolyMesh, _Said] = OrderedDict()
+        self._waiting: list[PolyMesh] = []  # made and not evaluated yet: they are, with the next one that is asked for
+
+    def prior(self, simulator: Simulator, state: State, actions: Sequence[Action]) -> FloatArray:
+        operators, regions = self._first_stage(simulator, state)
+        points = torch.from_numpy(action_points(state.mesh, actions)).float()[None]
+        classes = torch.tensor([[class_of(action) for action in actions]])
+        residual = np.log(self._residual.prior(simulator, state, actions))
+        with torch.inference_mode():
+            logits = self._net.choice_logits(operators, regions, points, classes, torch.from_numpy(residual)[None])
+        corrected = logits[0].double().numpy() - self._extra_price(simulator, actions)
+        odds = np.exp((corrected - corrected.max()) / self._temperature)
+        odds += _FLOOR
+        normalised: FloatArray = odds / odds.sum()
+        return normalised
+
+    def expand(self, simulator: Simulator, state: State, actions: Sequence[Action]) -> list[State]:
+        return self._made(simulator, simulator.transition_all(state, actions))
+
+    def _made(self, simulator: Simulator, states: list[State]) -> list[State]:
+        self._turn_to(simulator.silhouette)
+        waiting = [state.mesh for state in states if not state.done]
+        self._waiting = [*self._waiting, *waiting][-(_BATCH - 1) :]
+        return states
+
+    def _turn_to(self, target: Silhouette) -> None:
+        """Forget what was said about another target."""
+        if target is not self._target:
+            self._target, self._waiting = target, []
+            self._said.clear()
+
+    def _extra_price(self, simulator: Simulator, actions: Sequence[Action]) -> FloatArray:
+        """(A,) what the elements that each action adds cost more than in training, in units of the labels' softmax."""
+        dearer = (simulator.weights.w_sc - self._trained_w_sc) / self._label_temperature
+        return dearer * np.array([float(sum(_changes(action))) for action in actions])
+
+    def _first_stage(self, simulator: Simulator, state: State) -> _Said:
+        """What the network says of a state; shapes that wait are evaluated in the same batch."""
+        self._turn_to(simulator.silhouette)
+        if state.mesh not in self._said:
+            meshes = dict.fromkeys([state.mesh, *self._waiting])
+            self._waiting = []
+            self._evaluate(simulator.silhouette, [mesh for mesh in meshes if mesh not in self._said])
+        self._said.move_to_end(state.mesh)
+        return self._said[state.mesh]
+
+    def _evaluate(self, silhouette: Silhouette, meshes: Sequence[PolyMesh]) -> None:
+        config = self._net.config
+        target = silhouette.target(config.image_size).coverage
+        pictures = np.stack([draw_inputs(mesh, target, config.inputs) for mesh in meshes])
+        with torch.inference_mode():
+            said = self._net(torch.from_numpy(pictures), n_stages=1, with_images=False)
+        for row, mesh in enumerate(meshes):
+            once = slice(row, row + 1)
+            self._said[mesh] = said.operators[once, 0], said.regions[once, 0]
+        while len(self._said) > _REMEMBERED:
+            self._said.popitem(last=False)
+
+
+class WarpEvaluator(NfapEvaluator):
+    """nFAP-Net's priors and WarpNet's geometry, no refit at all: the paper's Algorithm 1.
+
+    The action is applied, then every vertex goes where the warp of the rendering to the target takes it. `placed`: new
+    vertices begin where rendering and target disagree, as before a refit. A warp that makes a shape worse is not taken.
+    Locked vertices and symmetry only a refit can heed: where a user has asked for them, it is refits after all.
+    """
+
+    def __init__(self, net: NfapNet, meta: Meta, warp: WarpNet, temperature: float = 1.0, placed: bool = True) -> None:
+        super().__init__(net, meta, temperature)
+        self._warp, self._placed = warp, placed
+
+    def expand(self, simulator: Simulator, state: State, actions: Sequence[Action]) -> list[State]:
+        if simulator.guidance.locked or simulator.guidance.axis is not None:
+            return super().expand(simulator, state, actions)
+        if state.done:
+            return []
+        begun = list(self._begin(simulator, state, actions))
+        if not begun:
+            return []
+        warped = self._warped(simulator, [mesh for _, _, mesh in begun])
+        made = [
+            _better(simulator, state, action, choice, before, after)
+            for (action, choice, before), after in zip(begun, warped, strict=True)
+        ]
+        return self._made(simulator, made)
+
+    def _begin(
+        self, simulator: Simulator, state: State, actions: Sequence[Action]
+    ) -> Iterable[tuple[Action, Choice | None, PolyMesh]]:
+        """The meshes right after the actions; those without room left out."""
+        disagreement = Disagreement(state.mesh, simulator.silhouette)
+        for action in actions:
+            try:
+                if self._placed:
+                    yield action, *starts(disagreement, action)[0]
+                else:
+                    operator = OPERATORS[action.operator]
+                    choice = operator.choose(state.mesh, action.element)
+                    yield action, choice, operator.apply(state.mesh, action.element, choice)
+            except IllegalActionError:
+                continue
+
+    def _warped(self, simulator: Simulator, meshes: Sequence[PolyMesh]) -> list[PolyMesh]:
+        """The meshes with their vertices carried by the warp of each to the target."""
+        size = self._warp.config.image_size
+        target = simulator.silhouette.target(size).coverage.astype(np.float32)
+        pictures = np.stack([np.stack((rendering(mesh, size), target)) for mesh in meshes])
+        vertices = np.zeros((len(meshes), max(len(mesh.vertices) for mesh in meshes), 2), np.float32)
+        for row, mesh in zip(vertices, meshes, strict=True):
+            row[: len(mesh.vertices)] = mesh.vertices
+        with torch.inference_mode():
+            goals = self._warp.goals(self._warp(torch.from_numpy(pictures)))
+            carried = self._warp.carry(goals, torch.from_numpy(vertices)).double().numpy()
+        return [mesh.with_vertices(row[: len(mesh.vertices)]) for row, mesh in zip(carried, meshes, strict=True)]
+
+
+def _better(
+    simulator: Simulator, state: State, action: Action, choice: Choice | None, before: PolyMesh, after: PolyMesh
+) -> State:
+    """The state after an action: the better of the shapes before and after the warp."""
+    states = [simulator.initial(mesh) for mesh in (before, after)]
+    best = max(states, key=lambda made: made.score.total)
+    step = state.step + 1
+    done = best.done or ("max_steps" if step >= simulator.max_steps else "")
+    return replace(best, step=step, done=done, action=action, choice=choice, n_refits=0)
+
+
+def _changes(action: Action) -> tuple[int, int, int]:
+    changes = OPERATORS[action.operator].changes
+    return changes[action.element % len(changes)]

@@ -1,0 +1,167 @@
+"""Where labelled constructions come from: the random construction simulator, a teacher who tries everything, search.
+
+- "simulator", the paper's: the random sequence that made a target. The action that was taken is the label.
+- "teacher": from the rectangle or a few random steps after it, every legal action is refitted and scored; all of the
+  outcomes are the label, and the construction goes on with an action drawn from them.
+- "search": the sequence that an agent found for a target. The action that was taken is the label.
+
+Trajectory number i depends on (settings, i) alone.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from agents.base import Budget
+from agents.registry import make_agent
+from agents.search.evaluator import ResidualEvaluator
+from autopoly_env.actions import Action
+from autopoly_env.errors import ConfigError
+from autopoly_env.mesh import PolyMesh
+from autopoly_env.operators import OPERATORS
+from autopoly_env.placement import is_sane
+from autopoly_env.score import Score, ScoreWeights
+from autopoly_env.sequence import ConstructionSequence
+from autopoly_env.sequence_ids import element_index
+from autopoly_env.silhouette import Silhouette
+from autopoly_env.simulator import Simulator, State
+from autopoly_env.targets import ConstructionTargets, ObjectTargets
+from training.trajectories import STOPPED, Labelled, Trajectory
+
+_HELD_OUT = 2**30  # first seed of the held-out targets; all are of the split "train", none of "test"
+
+
+@dataclass(frozen=True)
+class SourceConfig:
+    """What is built, and by whom."""
+
+    source: Literal["teacher", "simulator", "search"] = "teacher"
+    targets: Literal["both", "construction", "objects"] = (
+        "both"  # "both": in turn; "simulator" knows constructions only
+    )
+    difficulty: tuple[int, int] = (1, 8)  # of the constructions
+    resolution: int = 128  # pixels a side of targets and scores
+    operators: str = "full"
+    w_sc: float = 0.3  # by which the teacher and the search judge
+    n_steps: int = 10  # of the teacher at most
+    n_random: int = 2  # random steps before the teacher begins, at most
+    play_temperature: float = 0.5  # r_all points: how freely the teacher draws its next action
+    agent: str = "greedy"  # who searches
+    refits: int = 600  # for each target of the search
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if not 64 <= self.resolution <= 512:
+            raise ConfigError(f"resolution {self.resolution}: expected 64 to 512 pixels a side")
+        if self.n_steps < 1 or self.n_random < 0 or self.refits < 1 or self.seed < 0:
+            raise ConfigError(f"{self}: expected n_steps and refits of at least 1, n_random and seed of at least 0")
+        if not self.play_temperature > 0.0:
+            raise ConfigError(f"play_temperature = {self.play_temperature}: expected a number above 0")
+
+
+def build_trajectory(config: SourceConfig, number: int, held_out: bool = False) -> Trajectory:
+    """The labelled construction of this number; held-out ones are of other targets."""
+    rng = np.random.default_rng((config.seed, number, int(held_out)))
+    seed = (_HELD_OUT if held_out else 0) + int(rng.integers(_HELD_OUT))
+    if config.source == "simulator":
+        targets = _constructions(config)
+        return _from_sequence(config, targets.sample(seed), targets.sample_sequence(seed))
+    silhouette = _target(config, seed, number)
+    simulator = Simulator(
+        silhouette, operators=config.operators, resolution=config.resolution, weights=ScoreWeights(w_sc=config.w_sc)
+    )
+    if config.source == "search":
+        found = make_agent(config.agent).solve(simulator, Budget(refits=config.refits))
+        return _from_sequence(config, silhouette, found.sequence)
+    return _taught(config, simulator, rng)
+
+
+def _constructions(config: SourceConfig) -> ConstructionTargets:
+    return ConstructionTargets(config.difficulty, config.operators, config.resolution)
+
+
+def _target(config: SourceConfig, seed: int, number: int) -> Silhouette:
+    if config.targets == "construction" or (config.targets == "both" and number % 2 == 0):
+        return _constructions(config).sample(seed)
+    return ObjectTargets(resolution=config.resolution).sample(seed)
+
+
+def _taught(config: SourceConfig, simulator: Simulator, rng: np.random.Generator) -> Trajectory:
+    """Random steps, then the teacher's."""
+    state = simulator.initial()
+    for _ in range(int(rng.integers(config.n_random + 1))):
+        actions = simulator.legal_actions(state)[1:]
+        made = simulator.transition_all(state, [actions[int(rng.integers(len(actions)))]]) if actions else []
+        if made and is_sane(made[0].mesh):
+            state = made[0]
+    states: list[Labelled] = []
+    while len(states) < config.n_steps and not state.done:
+        labelled, following = _teach(config, simulator, state, rng)
+        states.append(labelled)
+        if following is None:
+            return Trajectory(simulator.silhouette.mask, tuple(states), ended=True)
+        state = following
+    states.append(Labelled(state.mesh, _parts(state.score), (), *_unknown(0), STOPPED))
+    return Trajectory(simulator.silhouette.mask, tuple(states), ended=bool(state.done))
+
+
+def _teach(
+    config: SourceConfig, simulator: Simulator, state: State, rng: np.random.Generator
+) -> tuple[Labelled, State | None]:
+    """All outcomes in a state, and the state that the teacher goes on to; None where it stops."""
+    actions = simulator.legal_actions(state)[1:]
+    rows = {action: row for row, action in enumerate(actions)}
+    outcomes, log_residual = _unknown(len(actions))
+    children = [child for child in simulator.transition_all(state, actions) if is_sane(child.mesh)]
+    for child in children:
+        outcomes[_row(rows, child)] = _parts(child.score)
+    gains = np.array([0.0, *(child.score.total - state.score.total for child in children)])
+    odds = np.exp((gains - gains.max()) / config.play_temperature)
+    drawn = int(rng.choice(len(gains), p=odds / odds.sum())) - 1
+    following = children[drawn] if drawn >= 0 else None
+    chosen = STOPPED if following is None else _row(rows, following)
+    log_residual[:] = _log_residual(simulator, state, actions)
+    return Labelled(state.mesh, _parts(state.score), tuple(actions), outcomes, log_residual, chosen), following
+
+
+def _row(rows: dict[Action, int], child: State) -> int:
+    assert child.action is not None  # it came from a transition
+    return rows[child.action]
+
+
+def _from_sequence(config: SourceConfig, silhouette: Silhouette, sequence: ConstructionSequence) -> Trajectory:
+    """The states that a sequence goes through, with the action taken as their label; after the last one, stop."""
+    simulator = Simulator(
+        silhouette, operators=config.operators, resolution=config.resolution, weights=ScoreWeights(w_sc=config.w_sc)
+    )
+    states = []
+    for mesh, step in zip(sequence.meshes(), (*sequence.steps, None), strict=True):
+        taken = None
+        if step is not None:
+            kind = OPERATORS[step.operator].element
+            taken = Action(step.operator, element_index(mesh, kind, step.element))
+        states.append(_hard(simulator, mesh, taken))
+    return Trajectory(silhouette.mask, tuple(states), ended=True)
+
+
+def _hard(simulator: Simulator, mesh: PolyMesh, taken: Action | None) -> Labelled:
+    state = State(mesh, simulator.score(mesh))
+    actions = simulator.legal_actions(state)[1:]
+    chosen = STOPPED if taken is None else actions.index(taken)
+    outcomes, log_residual = _unknown(len(actions))
+    log_residual[:] = _log_residual(simulator, state, actions)
+    return Labelled(mesh, _parts(state.score), tuple(actions), outcomes, log_residual, chosen)
+
+
+def _log_residual(simulator: Simulator, state: State, actions: Sequence[Action]) -> np.ndarray:
+    return np.log(ResidualEvaluator().prior(simulator, state, actions))
+
+
+def _parts(score: Score) -> np.ndarray:
+    return np.array((score.iou, score.complexity, score.self_intersections), np.float32)
+
+
+def _unknown(n: int) -> tuple[np.ndarray, np.ndarray]:
+    return np.full((n, 3), np.nan, np.float32), np.zeros(n, np.float32)

@@ -1,0 +1,160 @@
+"""Train nFAP-Net: the next n actions, where they work, and how the shape then looks (docs/learning.md).
+
+    python -m training.train_nfap --config configs/train/nfap.yaml                          # one CPU
+    python -m training.train_nfap --config configs/train/nfap.yaml optim.batch_size=512     # one GPU
+    torchrun --nproc-per-node 8 -m training.train_nfap --config configs/train/nfap.yaml     # one node, 8 processes
+    torchrun --nnodes 2 --node-rank 0 --nproc-per-node 8 --rdzv-backend c10d --rdzv-endpoint HOST:29500 \\
+        -m training.train_nfap --config configs/train/nfap.yaml             # two nodes; --node-rank 1 on the other
+
+The same command goes on with a run that was stopped. Overrides: section.key=value. At the end the run's folder has
+report.json and nfap.safetensors; --export makes these the weights that come with the project.
+"""
+
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any
+
+import torch
+import typer
+from torch import Tensor, nn
+
+from agents.guided.config import NfapConfig
+from agents.guided.nfap import Foresight, NfapLabels, NfapNet, loss_terms
+from training.command import run_command
+from training.finish import finish_run
+from training.net_metrics import mean_rows, nfap_metrics
+from training.net_pictures import draw_nfap
+from training.options import plain, read_config
+from training.samples import Batch, LabelConfig, NfapStream, batches
+from training.settings import DataConfig
+from training.trainer import OptimConfig, RunConfig, place_of, train
+
+N_DRAWN = 6  # samples in a picture of the log
+
+
+@dataclass(frozen=True)
+class LossWeights:
+    """Of the terms of nFAP-Net's loss. The paper has no choice and all others at 1, its pictures summed over pixels."""
+
+    image: float = 10.0
+    operator: float = 1.0
+    region: float = 10.0
+    choice: float = 1.0
+
+
+@dataclass(frozen=True)
+class TrainNfapConfig:
+    """Everything that can be set."""
+
+    net: NfapConfig = field(default_factory=NfapConfig)
+    data: DataConfig = field(default_factory=DataConfig)
+    labels: LabelConfig = field(default_factory=LabelConfig)
+    loss: LossWeights = field(default_factory=LossWeights)
+    optim: OptimConfig = field(default_factory=OptimConfig)
+    run: RunConfig = field(default_factory=RunConfig)
+
+
+class NfapLosses(nn.Module):
+    """A batch to the terms of its loss."""
+
+    def __init__(self, net: NfapNet, weights: LossWeights, amp: bool) -> None:
+        super().__init__()
+        self.net, self.weights, self.amp = net, weights, amp
+
+    def forward(self, batch: Batch) -> dict[str, Tensor]:
+        """The terms; "loss" is their weighted sum."""
+        return self.terms(self.foresee(batch), batch)
+
+    def foresee(self, batch: Batch) -> Foresight:
+        """What the network says, in half precision on a GPU."""
+        device = batch["pictures"].device.type
+        with torch.autocast(device, torch.bfloat16, enabled=self.amp and device == "cuda"):
+            said: Foresight = self.net(batch["pictures"])
+        return said
+
+    def terms(self, said: Foresight, batch: Batch) -> dict[str, Tensor]:
+        """The terms of what the network has said."""
+        truth = NfapLabels(**{name: batch[name] for name in NfapLabels.__dataclass_fields__})
+        terms = loss_terms(self.net, said, truth)
+        weighted = [getattr(self.weights, name) * term for name, term in terms.items()]
+        return {"loss": torch.stack(weighted).sum(), **terms}
+
+
+class NfapTask:
+    """nFAP-Net for the trainer."""
+
+    name = "nfap"
+
+    def __init__(self, config: TrainNfapConfig) -> None:
+        torch.manual_seed(config.run.seed)
+        self.config = config
+        self.net = NfapNet(config.net)
+        self.losses = NfapLosses(self.net, config.loss, config.run.amp)
+        learn, self._test = config.data.trajectories()
+        self.stream = NfapStream(learn, config.net, config.labels, config.run.seed)
+        self._held_out: list[Batch] = []
+
+    def held_out(self) -> list[Batch]:
+        """The samples to measure with, in batches; made once."""
+        if not self._held_out:
+            n = self.config.data.n_held_out
+            stream = NfapStream(self._test, self.config.net, self.config.labels, self.config.run.seed, turn=False)
+            source = batches(stream, min(64, n), 0)
+            self._held_out = [next(source) for _ in range(-(-n // 64))]
+        return self._held_out
+
+    def measure(self, device: torch.device) -> dict[str, float]:
+        """Loss, its terms and how good the priors are, on the held-out samples."""
+        rows = []
+        for batch in self.held_out():
+            batch = {name: tensor.to(device) for name, tensor in batch.items()}
+            said = self.losses.foresee(batch)
+            terms = {name: float(term) for name, term in self.losses.terms(said, batch).items()}
+            rows.append({**terms, **nfap_metrics(self.net, said, batch)})
+        return mean_rows(rows)
+
+    def draw(self, device: torch.device) -> Any:
+        """Current, target, and for every stage the true and the foreseen image and region."""
+        batch = {name: tensor[:N_DRAWN].to(device) for name, tensor in self.held_out()[0].items()}
+        return draw_nfap(self.losses.foresee(batch), batch)
+
+
+HELP = """Train nFAP-Net: the next n actions, where they work, and how the shape then looks.
+
+\b
+Examples:
+  python -m training.train_nfap --config configs/train/nfap.yaml
+  python -m training.train_nfap optim.lr=3e-4 run.seed=1 --out runs/other
+  torchrun --nproc-per-node 8 -m training.train_nfap --out runs/eight
+
+The same command goes on with a run that was stopped. At the end the folder has report.json and nfap.safetensors.
+See docs/learning.md, and the first lines of this script for more than one machine.
+"""
+
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+
+
+@app.command(help=HELP)
+def main_command(
+    overrides: Annotated[list[str] | None, typer.Argument(metavar="SECTION.KEY=VALUE")] = None,
+    config: Annotated[Path | None, typer.Option(help="A YAML file; what it leaves out is at its default.")] = None,
+    out: Annotated[Path, typer.Option(help="The run's folder.")] = Path("runs/nfap"),
+    export: Annotated[bool, typer.Option("--export", help="Make the result the project's own weights.")] = False,
+) -> int:
+    settings = read_config(config, overrides or [], TrainNfapConfig())
+    with place_of(settings.run) as place:
+        task = NfapTask(settings)
+        train(task, settings.optim, settings.run, plain(settings), out, place)
+        if place.leads:
+            finish_run(task, plain(settings), out, place.device, export)
+    return 0
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command; returns the exit code."""
+    return run_command(app, arguments, "python -m training.train_nfap")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

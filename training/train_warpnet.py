@@ -1,0 +1,163 @@
+"""Train WarpNet: the warp that takes the rendering of a mesh to the target, in place of a refit (docs/learning.md).
+
+    python -m training.train_warpnet --config configs/train/warpnet.yaml                        # one CPU
+    python -m training.train_warpnet --config configs/train/warpnet.yaml optim.batch_size=512   # one GPU
+    torchrun --nproc-per-node 8 -m training.train_warpnet --config configs/train/warpnet.yaml   # one node, 8 processes
+    torchrun --nnodes 2 --node-rank 0 --nproc-per-node 8 --rdzv-backend c10d --rdzv-endpoint HOST:29500 \\
+        -m training.train_warpnet --config configs/train/warpnet.yaml           # two nodes; --node-rank 1 there
+
+The same command goes on with a run that was stopped. Overrides: section.key=value. At the end the run's folder has
+report.json and warpnet.safetensors; --export makes these the weights that come with the project.
+"""
+
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any
+
+import torch
+import typer
+from torch import Tensor, nn
+
+from agents.guided.config import WarpConfig
+from agents.guided.warp import Theta, WarpLabels, WarpNet, loss_terms
+from autopoly_env.errors import ConfigError
+from training.command import run_command
+from training.finish import finish_run
+from training.net_metrics import mean_rows, warp_metrics
+from training.net_pictures import draw_warp
+from training.options import plain, read_config
+from training.samples import Batch, WarpStream, batches
+from training.settings import DataConfig
+from training.trainer import OptimConfig, RunConfig, place_of, train
+
+N_DRAWN = 8  # samples in a picture of the log
+
+
+@dataclass(frozen=True)
+class LossWeights:
+    """Of the terms of WarpNet's loss. The paper has the image's term only."""
+
+    image: float = 1.0
+    mesh: float = 1.0
+    bend: float = 0.1
+
+
+@dataclass(frozen=True)
+class TrainWarpnetConfig:
+    """Everything that can be set."""
+
+    net: WarpConfig = field(default_factory=WarpConfig)
+    data: DataConfig = field(default_factory=DataConfig)
+    placed_share: float = 1.0  # of samples whose new vertices begin at the disagreement; the others' do on the edge
+    loss: LossWeights = field(default_factory=LossWeights)
+    optim: OptimConfig = field(default_factory=OptimConfig)
+    run: RunConfig = field(default_factory=RunConfig)
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.placed_share <= 1.0:
+            raise ConfigError(f"placed_share = {self.placed_share}: expected a share, 0 to 1")
+
+
+class WarpLosses(nn.Module):
+    """A batch to the terms of its loss."""
+
+    def __init__(self, net: WarpNet, weights: LossWeights, amp: bool) -> None:
+        super().__init__()
+        self.net, self.weights, self.amp = net, weights, amp
+
+    def forward(self, batch: Batch) -> dict[str, Tensor]:
+        """The terms; "loss" is their weighted sum."""
+        return self.terms(self.theta(batch), batch)
+
+    def theta(self, batch: Batch) -> Theta:
+        """What the network says, in half precision on a GPU."""
+        device = batch["pictures"].device.type
+        with torch.autocast(device, torch.bfloat16, enabled=self.amp and device == "cuda"):
+            said: Theta = self.net(batch["pictures"])
+        return said
+
+    def terms(self, theta: Theta, batch: Batch) -> dict[str, Tensor]:
+        """The terms of what the network has said."""
+        terms = loss_terms(self.net, theta, WarpLabels(batch["pictures"], batch["vertices"], batch["edges"]))
+        weighted = [getattr(self.weights, name) * term for name, term in terms.items()]
+        return {"loss": torch.stack(weighted).sum(), **terms}
+
+
+class WarpTask:
+    """WarpNet for the trainer."""
+
+    name = "warpnet"
+
+    def __init__(self, config: TrainWarpnetConfig) -> None:
+        torch.manual_seed(config.run.seed)
+        self.config = config
+        self.net = WarpNet(config.net)
+        self.losses = WarpLosses(self.net, config.loss, config.run.amp)
+        learn, self._test = config.data.trajectories()
+        self.stream = WarpStream(learn, config.net, config.run.seed, config.placed_share)
+        self._held_out: list[Batch] = []
+
+    def held_out(self) -> list[Batch]:
+        """The samples to measure with, in batches; made once."""
+        if not self._held_out:
+            n, config = self.config.data.n_held_out, self.config
+            stream = WarpStream(self._test, config.net, config.run.seed, config.placed_share, turn=False)
+            source = batches(stream, min(64, n), 0)
+            self._held_out = [next(source) for _ in range(-(-n // 64))]
+        return self._held_out
+
+    def measure(self, device: torch.device) -> dict[str, float]:
+        """Loss, its terms and the share of a refit's gain, on the held-out samples."""
+        rows = []
+        for batch in self.held_out():
+            batch = {name: tensor.to(device) for name, tensor in batch.items()}
+            theta = self.losses.theta(batch)
+            terms = {name: float(term) for name, term in self.losses.terms(theta, batch).items()}
+            rows.append({**terms, **warp_metrics(self.net, theta, batch)})
+        return mean_rows(rows)
+
+    def draw(self, device: torch.device) -> Any:
+        """Current, target, as warped, the carried mesh, the full refit."""
+        batch = {name: tensor[:N_DRAWN].to(device) for name, tensor in self.held_out()[0].items()}
+        return draw_warp(self.net, self.losses.theta(batch), batch)
+
+
+HELP = """Train WarpNet: the warp that takes the rendering of a mesh to the target.
+
+\b
+Examples:
+  python -m training.train_warpnet --config configs/train/warpnet.yaml
+  python -m training.train_warpnet optim.lr=3e-4 run.seed=1 --out runs/other
+  torchrun --nproc-per-node 8 -m training.train_warpnet --out runs/eight
+
+The same command goes on with a run that was stopped. At the end the folder has report.json and warpnet.safetensors.
+See docs/learning.md, and the first lines of this script for more than one machine.
+"""
+
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+
+
+@app.command(help=HELP)
+def main_command(
+    overrides: Annotated[list[str] | None, typer.Argument(metavar="SECTION.KEY=VALUE")] = None,
+    config: Annotated[Path | None, typer.Option(help="A YAML file; what it leaves out is at its default.")] = None,
+    out: Annotated[Path, typer.Option(help="The run's folder.")] = Path("runs/warpnet"),
+    export: Annotated[bool, typer.Option("--export", help="Make the result the project's own weights.")] = False,
+) -> int:
+    settings = read_config(config, overrides or [], TrainWarpnetConfig())
+    with place_of(settings.run) as place:
+        task = WarpTask(settings)
+        train(task, settings.optim, settings.run, plain(settings), out, place)
+        if place.leads:
+            finish_run(task, plain(settings), out, place.device, export)
+    return 0
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command; returns the exit code."""
+    return run_command(app, arguments, "python -m training.train_warpnet")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,279 @@
+"""The loop that trains a network: batches, loss, step, log, measure, save; on one CPU, one GPU or many of either.
+
+A run is a folder. It may be stopped at any moment and goes on from its last checkpoint along the same curve; on CPUs
+bit for bit. Letters: B batch, W processes (under torchrun), each with its own B samples of a step.
+"""
+
+import math
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from io import BytesIO
+from pathlib import Path
+from typing import Any, Literal, Protocol
+
+import numpy as np
+import torch
+import torch.distributed as dist
+from torch import Tensor, nn
+from torch.nn.parallel import DistributedDataParallel
+
+from autopoly_env.errors import ConfigError, RunError
+from autopoly_env.files import write_atomically
+from training.run_log import RunLog
+from training.samples import Batch, batches
+
+_HARMLESS = ("n_workers", "n_threads", "device", "log_every", "save_every")  # a run may go on with other ones
+
+
+@dataclass(frozen=True)
+class OptimConfig:
+    """AdamW with a linear warm-up and a cosine to 0."""
+
+    lr: float = 1e-3
+    weight_decay: float = 1e-3
+    warmup: int = 100  # steps
+    n_steps: int = 6000
+    batch_size: int = 64  # of each process
+    clip: float = 1.0  # largest norm of the gradient
+
+    def __post_init__(self) -> None:
+        if not (self.lr > 0.0 and self.clip > 0.0 and self.weight_decay >= 0.0):
+            raise ConfigError(f"{self}: expected lr and clip above 0 and a weight_decay of at least 0")
+        if self.n_steps < 1 or self.batch_size < 1 or self.warmup < 0:
+            raise ConfigError(f"{self}: expected n_steps and batch_size of at least 1 and a warmup of at least 0")
+
+    def lr_at(self, step: int) -> float:
+        """The learning rate of a step, 0 <= step < n_steps."""
+        if step < self.warmup:
+            return self.lr * (step + 1) / self.warmup
+        done = (step - self.warmup) / max(1, self.n_steps - self.warmup)
+        return 0.5 * self.lr * (1.0 + math.cos(math.pi * done))
+
+
+@dataclass(frozen=True)
+class RunConfig:
+    """How a run is carried out."""
+
+    seed: int = 0
+    device: Literal["auto", "cpu", "cuda"] = "auto"
+    amp: bool = True  # half precision in the networks where there is a GPU
+    n_workers: int = 1  # processes that make samples; 0: this one does
+    n_threads: int = 0  # of torch; 0: as it likes
+    log_every: int = 20  # steps
+    eval_every: int = 250
+    save_every: int = 100
+    patience: int = 12  # measurements in a row that may fail to lower the held-out loss
+
+    def __post_init__(self) -> None:
+        if min(self.log_every, self.eval_every, self.save_every, self.patience) < 1:
+            raise ConfigError(f"{self}: expected log_every, eval_every, save_every and patience of at least 1")
+        if min(self.seed, self.n_workers, self.n_threads) < 0:
+            raise ConfigError(f"{self}: expected a seed, n_workers and n_threads of at least 0")
+
+
+class Task(Protocol):
+    """What is trained, on what, and how it is measured."""
+
+    name: str
+    stream: Any  # torch Dataset: samples by number
+
+    @property
+    def net(self) -> nn.Module:
+        """The network."""
+
+    @property
+    def losses(self) -> nn.Module:
+        """A batch to the terms of its loss by name, "loss" being their weighted sum; has `net` in it."""
+
+    def measure(self, device: torch.device) -> dict[str, float]:
+        """Held-out metrics of `net`, "loss" among them."""
+
+    def draw(self, device: torch.device) -> np.ndarray:
+        """(H, W) or (H, W, 3) uint8: predictions beside the truth."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Which of W processes this is, and where it computes."""
+
+    rank: int = 0
+    n_ranks: int = 1
+    device: torch.device = field(default_factory=lambda: torch.device("cpu"))
+
+    @property
+    def leads(self) -> bool:
+        """Whether it is the one that measures, writes and prints."""
+        return self.rank == 0
+
+
+@contextmanager
+def place_of(config: RunConfig) -> Iterator[Place]:
+    """This process's place: as torchrun says, else alone. Raises ConfigError if there is no GPU for device "cuda"."""
+    has_gpu = torch.cuda.is_available()
+    if config.device == "cuda" and not has_gpu:
+        raise ConfigError("device cuda: torch finds no GPU here; give run.device=cpu")
+    if config.n_threads:
+        torch.set_num_threads(config.n_threads)
+    on_gpu = has_gpu and config.device != "cpu"
+    local = int(os.environ.get("LOCAL_RANK", "0"))
+    device = torch.device("cuda", local) if on_gpu else torch.device("cpu")
+    if int(os.environ.get("WORLD_SIZE", "1")) == 1:
+        yield Place(device=device)
+        return
+    if on_gpu:
+        torch.cuda.set_device(device)
+    dist.init_process_group("nccl" if on_gpu else "gloo")
+    try:
+        yield Place(dist.get_rank(), dist.get_world_size(), device)
+    finally:
+        dist.destroy_process_group()
+
+
+@dataclass
+class _Progress:
+    """Where a run stands."""
+
+    step: int = 0
+    best_loss: float = math.inf
+    best_step: int = 0
+    best: dict[str, Tensor] = field(default_factory=dict)  # the network's tensors then
+    n_worse: int = 0  # measurements since
+
+
+def train(task: Task, optim: OptimConfig, run: RunConfig, settings: dict[str, Any], folder: Path, place: Place) -> None:
+    """Train `task.net` to the end, or go on with what `folder` holds; leaves the best network in `task.net`.
+
+    Raises RunError if the folder belongs to a run with other settings, or the loss is not a number.
+    """
+    progress = _Progress()
+    task.losses.to(place.device)
+    optimizer = torch.optim.AdamW(task.net.parameters(), lr=optim.lr, weight_decay=optim.weight_decay)
+    _resume(task, optimizer, progress, settings, folder, place)
+    losses: nn.Module = DistributedDataParallel(task.losses) if place.n_ranks > 1 else task.losses
+    log = RunLog(folder, progress.step) if place.leads else None
+    if log is not None and progress.step:
+        print(f"{folder}: goes on at step {progress.step}", flush=True)
+    stream = batches(task.stream, optim.batch_size, run.n_workers, progress.step, place.rank, place.n_ranks)
+    while progress.step < optim.n_steps and progress.n_worse < run.patience:
+        step = progress.step
+        batch = {name: tensor.to(place.device, non_blocking=True) for name, tensor in next(stream).items()}
+        terms = _update(losses, optimizer, batch, optim, step)
+        if not math.isfinite(terms["loss"]):
+            raise RunError(_broken(terms, run.seed, step, optim.batch_size, place))
+        progress.step = step + 1
+        if log is not None and progress.step % run.log_every == 0:
+            log.write(progress.step, "train", {**terms, "lr": optim.lr_at(step)})
+        if progress.step % run.eval_every == 0 or progress.step == optim.n_steps:
+            _measure(task, progress, log, place)
+        if place.leads and (progress.step % run.save_every == 0 or progress.step == optim.n_steps):
+            _save(task, optimizer, progress, settings, folder)
+    if place.leads:
+        _save(task, optimizer, progress, settings, folder)
+    task.net.load_state_dict(progress.best)
+
+
+def _update(
+    losses: nn.Module, optimizer: torch.optim.Optimizer, batch: Batch, optim: OptimConfig, step: int
+) -> dict[str, float]:
+    """One step; the loss and its terms before it. A loss that is not a number changes nothing."""
+    for group in optimizer.param_groups:
+        group["lr"] = optim.lr_at(step)
+    optimizer.zero_grad(set_to_none=True)
+    terms: dict[str, Tensor] = losses(batch)
+    if bool(torch.isfinite(terms["loss"])):
+        terms["loss"].backward()
+        nn.utils.clip_grad_norm_([p for group in optimizer.param_groups for p in group["params"]], optim.clip)
+        optimizer.step()
+    return {name: float(term.detach()) for name, term in terms.items()}
+
+
+def _broken(terms: dict[str, float], seed: int, step: int, batch_size: int, place: Place) -> str:
+    begin = (step * place.n_ranks + place.rank) * batch_size
+    odd = [name for name, term in terms.items() if not math.isfinite(term)]
+    return (
+        f"the loss is {terms['loss']} at step {step} ({', '.join(odd)}): samples {begin}..{begin + batch_size - 1} of "
+        f"seed {seed}; go on from the last checkpoint with a lower optim.lr, or look at these samples"
+    )
+
+
+def _measure(task: Task, progress: _Progress, log: RunLog | None, place: Place) -> None:
+    """Measure on the held-out samples, in the leading process; all learn whether it was better."""
+    loss = torch.zeros((), dtype=torch.float64, device=place.device)
+    if log is not None:
+        task.net.eval()
+        with torch.no_grad():
+            metrics = task.measure(place.device)
+            log.write(progress.step, "held_out", metrics)
+            log.picture(progress.step, task.draw(place.device))
+        task.net.train()
+        loss.fill_(metrics["loss"])
+        print(f"step {progress.step}: " + ", ".join(f"{k} {v:.4g}" for k, v in metrics.items()), flush=True)
+    if place.n_ranks > 1:
+        dist.broadcast(loss, 0)
+    if not math.isfinite(float(loss)):
+        raise RunError(f"the held-out loss is {float(loss)} at step {progress.step}; begin anew with a lower optim.lr")
+    progress.n_worse += 1
+    if float(loss) < progress.best_loss:
+        progress.best_loss, progress.best_step, progress.n_worse = float(loss), progress.step, 0
+        progress.best = {name: tensor.detach().cpu().clone() for name, tensor in task.net.state_dict().items()}
+
+
+# --- checkpoints ---
+
+
+def _checkpoint(folder: Path) -> Path:
+    return folder / "checkpoint.pt"
+
+
+def _save(
+    task: Task, optimizer: torch.optim.Optimizer, progress: _Progress, settings: dict[str, Any], folder: Path
+) -> None:
+    buffer = BytesIO()
+    state = {
+        "settings": settings,
+        "net": task.net.state_dict(),
+        "optimizer": optimizer.state_dict(),
+        "progress": vars(progress),
+    }
+    torch.save(state, buffer)
+    write_atomically(_checkpoint(folder), buffer.getvalue())
+
+
+def _resume(
+    task: Task,
+    optimizer: torch.optim.Optimizer,
+    progress: _Progress,
+    settings: dict[str, Any],
+    folder: Path,
+    place: Place,
+) -> None:
+    """Put everything as the folder's checkpoint has it, if there is one."""
+    path = _checkpoint(folder)
+    if not path.exists():
+        return
+    try:
+        state = torch.load(path, map_location=place.device, weights_only=True)
+        known, saved = state["settings"], state["progress"]
+    except Exception as error:  # torch raises whatever the damage leads it to
+        raise RunError(f"cannot read {path} ({type(error).__name__}); delete it to begin anew") from None
+    key = _first_difference(known, settings)
+    if key:
+        raise RunError(f"{folder} belongs to a run with another {key}; give another --out, or the same settings")
+    task.net.load_state_dict(state["net"])
+    optimizer.load_state_dict(state["optimizer"])
+    vars(progress).update(saved)
+
+
+def _first_difference(one: Any, other: Any, key: str = "") -> str:
+    """The dotted key of the first setting that is not the same in both; empty if there is none."""
+    if not (isinstance(one, dict) and isinstance(other, dict)):
+        return "" if one == other else key
+    for name in sorted(one.keys() | other.keys()):
+        if name in _HARMLESS:
+            continue
+        found = _first_difference(one.get(name), other.get(name), f"{key}.{name}".lstrip("."))
+        if found:
+            return found
+    return ""
