@@ -134,3 +134,16 @@ def test_hop__finds_better_tops_and_the_same_ones_for_a_seed() -> None:
 def test_hop__stops_at_the_budget() -> None:
     assert hopped(0, patience=10**6, budget=Budget(refits=0)) == []
     assert len(hopped(0, patience=10**6, budget=Budget(refits=400))) > 0
+
+
+def test_neighbours__open_a_hole_where_its_rim_is_thinnest() -> None:
+    hole = np.array([(0.3, 0.3), (0.3, 0.6), (0.75, 0.6), (0.75, 0.3)])  # wound backwards, nearest to the right
+    ring = Outline((Ring(BOX, -1), Ring(hole, 0)))
+    mask = np.zeros((40, 40), np.bool_)
+    mask[8:32, 8:32] = True
+    mask[12:24, 12:30] = False
+    found = neighbours(ring, Silhouette(mask), [], 1, holes=True)
+    opened = next(o for o in found if len(o.rings) == 1 and len(o.rings[0].points) == 8)
+    polygon = shapely.Polygon(opened.rings[0].points)
+    assert polygon.is_valid and polygon.exterior.is_ccw  # as shoelace counts, y down
+    assert not polygon.contains(shapely.Point(0.78, 0.45)) and polygon.contains(shapely.Point(0.25, 0.45))

@@ -31,6 +31,7 @@ def neighbours(
         yield _grown(outline, disagreement, row, "edge_subdivide")
         yield _grown(outline, disagreement, row, "edge_extrude")
     yield from (outline.without_ring(k) for k in range(1, len(outline.rings)))
+    yield from (_opened(outline, k) for k, ring in enumerate(outline.rings) if ring.is_hole)
     if len(outline.rings) < len(contours):
         yield from _one_ring_more(outline, contours)
     if holes:
@@ -98,6 +99,20 @@ def _grown(outline: Outline, disagreement: Disagreement, row: int, operator: str
     ring = outline.rings[k]
     place = a - (int(ends[k]) - len(ring.points)) + 1
     return outline.with_ring(k, Ring(np.insert(ring.points, place, new_points, axis=0), ring.parent))
+
+
+def _opened(outline: Outline, index: int) -> Outline:
+    """The outline with a hole opened to the outside where the edges of the two rings are closest."""
+    hole, parent = outline.rings[index], outline.rings[index].parent
+    outer = outline.rings[parent].points
+    inner = hole.points
+    middles = [0.5 * (points + np.roll(points, -1, axis=0)) for points in (outer, inner)]
+    gaps = np.hypot(*(middles[0][:, None] - middles[1][None]).T)  # (edges of the hole, edges of the outer ring)
+    j, i = np.unravel_index(np.argmin(gaps), gaps.shape)
+    points = np.concatenate((outer[: i + 1], np.roll(inner, -(j + 1), axis=0), outer[i + 1 :]))
+    rings = list(outline.rings)
+    rings[parent] = Ring(points, -1)
+    return outline_of([ring for k, ring in enumerate(rings) if k != index], rings)
 
 
 def _one_ring_more(outline: Outline, contours: Sequence[Ring]) -> Iterator[Outline]:
