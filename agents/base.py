@@ -4,10 +4,12 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
-from itertools import islice
+from itertools import islice, pairwise
 from typing import TypeVar
 
+from agents.pare import pare
+from agents.settle import settle
+from agents.tidy import tidy
 from autopoly_env.actions import STOP, Action
 from autopoly_env.edits import Choice
 from autopoly_env.errors import ConfigError
@@ -17,7 +19,6 @@ from autopoly_env.score import Score
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence_file import Score as PlainScore
 from autopoly_env.simulator import Simulator, State
-
 
 _Start = TypeVar("_Start")
 
@@ -129,6 +130,12 @@ class Meter:
             self._whole.count(n_refits, best_total)
         if self._on_progress is not None:
             self._on_progress(Progress(self._best_total, self._n_steps, self._n_refits, self._n_nodes))
+
+    def add_refits(self, n_refits: int) -> None:
+        """Note refits that are no step of the work, and so nothing to report."""
+        self._n_refits += n_refits
+        if self._whole is not None:
+            self._whole.add_refits(n_refits)
 
     def spent(self) -> bool:
         """Whether the budget is used up, or the one that this is a part of."""
@@ -254,20 +261,32 @@ def check_guidance(agent: Agent, names: Sequence[str]) -> None:
         )
 
 
-def finish(simulator: Simulator, states: Sequence[State], meter: Meter) -> Solution:
+def finish(simulator: Simulator, states: Sequence[State], meter: Meter, *, keep_steps: bool = False) -> Solution:
     """The solution that `states` construct, the last mesh polished, scored at the silhouette's own resolution.
 
-    A start mesh that nothing was done to stays as it is; a sequence that was gone on from comes before the new steps.
-    A KeyboardInterrupt on the way is noted, and the work done nevertheless.
+    What the shape does not need is taken away (`pare`), if the budget is not spent; the steps are told without detours
+    (`tidy`) and, where the weights ask for it, with fewer moves (`settle`); none of that if `keep_steps`. A start mesh
+    that nothing was done to stays as it is; a sequence that was gone on from comes before the new steps. A
+    KeyboardInterrupt on the way is noted, and the work done nevertheless.
     """
     try:
-        return _finish(simulator, states, meter)
+        return _finish(simulator, states, meter, keep_steps)
     except KeyboardInterrupt:
         meter.stopped_by = "interrupted"
-        return _finish(simulator, states, meter)
+        return _finish(simulator, states, meter, keep_steps)
 
 
-def _finish(simulator: Simulator, states: Sequence[State], meter: Meter) -> Solution:
+def _finish(simulator: Simulator, states: Sequence[State], meter: Meter, keep_steps: bool) -> Solution:
+    versions = [states]
+    if not (keep_steps or meter.stopped_by == "interrupted" or meter.spent()):
+        pared, n_refits, n_taken = pare(simulator, states)
+        meter.add_refits(n_refits)
+        versions += [pared] if n_taken else []
+    solutions = [_told(simulator, version, meter, keep_steps) for version in versions]
+    return max(solutions, key=lambda solution: solution.score.total)
+
+
+def _told(simulator: Simulator, states: Sequence[State], meter: Meter, keep_steps: bool) -> Solution:
     meshes = [state.mesh for state in states]
     if len(meshes) > 1 or simulator.guidance.start is None:
         meshes[-1] = _polished(simulator, meshes)
@@ -281,10 +300,12 @@ def _finish(simulator: Simulator, states: Sequence[State], meter: Meter) -> Solu
         for transition in _transitions_of(simulator, state, mesh, score)
     ]
     sequence = ConstructionSequence.record(settings, meshes[0], scores[0].as_dict(), transitions)
-    earlier = simulator.guidance.earlier
+    if not keep_steps:
+        sequence = settle(tidy(sequence, simulator.final_score), simulator)
+    mesh, earlier = sequence.final(), simulator.guidance.earlier
     if earlier is not None:
-        sequence = continued(earlier, sequence, [simulator.final_score(mesh).as_dict() for mesh in earlier.meshes()])
-    return Solution(sequence, meshes[last], scores[last], meter.stats())
+        sequence = continued(earlier, sequence, [simulator.final_score(m).as_dict() for m in earlier.meshes()])
+    return Solution(sequence, mesh, scores[last], meter.stats())
 
 
 def _polished(simulator: Simulator, meshes: Sequence[PolyMesh]) -> PolyMesh:

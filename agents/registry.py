@@ -8,9 +8,12 @@ from pydantic import TypeAdapter, ValidationError
 
 from agents.base import Agent
 from agents.beam import BeamAgent, BeamConfig
-from agents.climb import ClimbAgent, ClimbConfig
+from agents.climb.agent import ClimbAgent, ClimbConfig
 from agents.decimate import DecimateAgent, DecimateConfig
 from agents.fixed_topology import DrComplexConfig, DrSimpleConfig, dr_complex, dr_simple
+from agents.guided.agent import nfap_mcts, nfap_prior
+from agents.guided.config import NfapMctsConfig, NfapPriorConfig
+from agents.oracle import OracleAgent, OracleConfig
 from agents.random_agent import RandomAgent, RandomConfig
 from agents.search.config import PAPER, MctsConfig
 from agents.search.mcts import MctsAgent, PaperMctsAgent
@@ -30,6 +33,10 @@ def _mcts_paper(config: MctsConfig) -> Agent:
     return PaperMctsAgent(config, [make_agent(name) for name in config.seeds])
 
 
+def _nfap_prior(config: NfapPriorConfig) -> Agent:
+    return nfap_prior(config, [make_agent(name) for name in config.seeds])
+
+
 AGENTS: dict[str, tuple[Callable[[Any], Agent], Any]] = {
     "random": (RandomAgent, RandomConfig()),
     "greedy": (_Greedy, BeamConfig(width=1)),
@@ -39,6 +46,9 @@ AGENTS: dict[str, tuple[Callable[[Any], Agent], Any]] = {
     "decimate": (DecimateAgent, DecimateConfig()),
     "mcts": (_mcts, MctsConfig()),
     "mcts_paper": (_mcts_paper, PAPER),
+    "nfap-prior": (_nfap_prior, NfapPriorConfig()),
+    "nfap-mcts": (nfap_mcts, NfapMctsConfig()),
+    "oracle": (OracleAgent, OracleConfig()),
     "dr-simple": (dr_simple, DrSimpleConfig()),
     "dr-complex": (dr_complex, DrComplexConfig()),
 }

@@ -41,6 +41,10 @@ and --symmetry are for those that play step by step: beam, greedy, random, mcts.
 Printed are the scores, at each image's own resolution, and the picture to open:
   r_all = w_sm r_sm - w_sc r_sc - w_si r_si
   r_sm: IoU, 0 to 1      r_sc: V + E + F      r_si: self-intersections
+and how the construction reads (docs/lessons.md): the number of actions, and
+  valid: share of meshes without crossings and flipped faces, 1 is expected
+  blocking_in: mean r_sm on the way, high where the big shape comes first
+  moved: share of the vertices already there that a step moves, LOW is good
 
 Ctrl-C writes the best mesh so far of the image in work and stops; a second one aborts at once.
 Exit codes: 0 all is well, 1 something failed, 2 wrong usage, 130 Ctrl-C.
@@ -65,6 +69,9 @@ def solve(
     w_sm: Annotated[float, typer.Option(help="Weight of the IoU.")] = 100.0,
     w_sc: Annotated[float, typer.Option(help="Weight of the complexity V + E + F.")] = 0.3,
     w_si: Annotated[float, typer.Option(help="Weight of the self-intersections.")] = 5.0,
+    w_locality: Annotated[
+        float, typer.Option(help="Price of moving vertices already there, off r_all in choosing steps; try 0.5.")
+    ] = 0.0,
     resolution: Annotated[int, typer.Option(help="Pixels a side at which the agent works.")] = 128,
     max_steps: Annotated[int, typer.Option(help="Steps after which a construction ends.")] = 100,
     seconds: Annotated[
@@ -107,7 +114,7 @@ def solve(
     from agents.solve_run import Settings, name_jobs, solve_all
     from autopoly_env.score import ScoreWeights
 
-    weights = ScoreWeights(w_sm, w_sc, w_si)
+    weights = ScoreWeights(w_sm, w_sc, w_si, w_locality)
     budget = Budget(refits, seconds, simulations)
     wishes = read_wishes(importance, start, lock, symmetry)
     options = _parse_options(option or [])

@@ -12,10 +12,11 @@ from rich.text import Text
 
 from agents import base
 from agents.solve_files import Result
+from autopoly_env.lesson import Lesson
 
-COLUMNS = ("r_sm", "r_sc", "r_si", "r_all", "actions", "refits", "seconds")
-FORMATS = (".4f", ".0f", ".0f", ".2f", ".0f", ".0f", ".2f")
-MEAN_FORMATS = (".4f", ".1f", ".1f", ".2f", ".1f", ".1f", ".2f")
+COLUMNS = ("r_sm", "r_sc", "r_si", "r_all", "actions", "valid", "blocking_in", "moved", "refits", "seconds")
+FORMATS = (".4f", ".0f", ".0f", ".2f", ".0f", ".2f", ".3f", ".3f", ".0f", ".2f")
+MEAN_FORMATS = (".4f", ".1f", ".1f", ".2f", ".1f", ".2f", ".3f", ".3f", ".1f", ".2f")
 WARNING = "warning:"
 MOST_NOTES = 8  # lines of notes below a table
 MOST_NAMES = 4  # names of images in such a line
@@ -123,9 +124,9 @@ def _print_record(record: dict[str, Any]) -> None:
 def _numbers_of(result: Result) -> tuple[float, ...]:
     """A row of the table, in the order of COLUMNS."""
     score, stats = result.solution.score, result.solution.stats
-    n_actions = len(result.solution.sequence.steps)
+    lesson = Lesson.of(result.solution.sequence)
     parts = (score.iou, score.complexity, score.self_intersections, score.total)
-    return (*parts, n_actions, stats.n_refits, stats.seconds)
+    return (*parts, lesson.n_actions, lesson.valid, lesson.blocking_in, lesson.moved, stats.n_refits, stats.seconds)
 
 
 def _table(rows: dict[str, tuple[float, ...]]) -> Table:
@@ -159,6 +160,7 @@ def record_of(result: Result) -> dict[str, Any]:
     solution = result.solution
     n_vertices, n_edges, n_faces = solution.mesh.counts
     settings = solution.sequence.settings
+    lesson = Lesson.of(solution.sequence)
     return {
         "image": str(result.image),
         "name": result.name,
@@ -172,7 +174,10 @@ def record_of(result: Result) -> dict[str, Any]:
         "V": n_vertices,
         "E": n_edges,
         "F": n_faces,
-        "actions": len(solution.sequence.steps),
+        "actions": lesson.n_actions,
+        "valid": lesson.valid,
+        "blocking_in": lesson.blocking_in,
+        "moved": lesson.moved,
         "refits": solution.stats.n_refits,
         "seconds": solution.stats.seconds,
         "stopped_by": solution.stats.stopped_by,

@@ -168,7 +168,7 @@ def _checked_transition(simulator: Simulator, state: State, action: Any, where: 
     _require(batched is not None and _same_state(after, batched), f"{where} gives another state in transition_all")
     _require(pickle.dumps(state) == before, f"{where} changed the state that it started from")
     _require(_same_state(after, pickle.loads(pickle.dumps(after))), f"{where}: the state does not survive pickling")
-    _require(after.score == simulator.score(after.mesh), f"{where}: the score is not that of the mesh")
+    _require(after.score == simulator.score(after.mesh, state.mesh), f"{where}: the score is not that of the mesh")
     _require(after.step == state.step + 1, f"{where}: the step is not counted")
     _require(is_valid(after.mesh), f"{where} gives a mesh that is not valid")
     _require(bool(after.done) or after.step < simulator.max_steps, f"{where}: max_steps is not kept")

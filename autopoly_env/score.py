@@ -16,11 +16,12 @@ from autopoly_env.silhouette import Target
 
 @dataclass(frozen=True)
 class ScoreWeights:
-    """Weights of the reward's three terms (paper, section 3.5)."""
+    """Weights of the reward's three terms (paper, section 3.5), and of what a step may leave in peace."""
 
     w_sm: float = 100.0
     w_sc: float = 0.3  # the paper's for ShapeNet silhouettes; 1 for its synthetic shapes
     w_si: float = 5.0
+    w_locality: float = 0.0  # of the share of old vertices that a step moves; counts in choosing steps, not in r_all
 
     def __post_init__(self) -> None:
         for name, value in asdict(self).items():

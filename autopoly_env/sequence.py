@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -81,6 +81,32 @@ class ConstructionSequence:
         if not 0 <= n <= len(self.steps):
             raise SequenceError(f"cannot trim {len(self.steps)} steps to {n}; give 0..{len(self.steps)}")
         return replace(self, steps=self.steps[:n])
+
+    def with_step(
+        self,
+        k: int,
+        *,
+        moved: Mapping[int, tuple[float, float]] | None = None,
+        choice: Mapping[str, Any] | None = None,
+        insert: Step | None = None,
+        drop: bool = False,
+    ) -> "ConstructionSequence":
+        """An edit at step k, carried on to the end (docs/variations.md): one of three.
+
+        `moved` takes vertices, by id, elsewhere after step k (0: in the start mesh) and `choice` replaces the step's
+        own, one or both; `insert` is a step to take after step k; `drop` leaves step k out. Later steps are taken
+        again. Raises SequenceError naming the step, this or a later one, that is illegal then.
+        """
+        from autopoly_env import variation
+
+        lowest = 1 if drop or choice is not None else 0
+        if not lowest <= k <= len(self.steps):
+            raise SequenceError(f"step {k} of a sequence of {len(self.steps)}: give {lowest}..{len(self.steps)}")
+        if (moved is not None or choice is not None) + (insert is not None) + drop != 1:
+            raise SequenceError("give one edit of a step: moved and choice, or insert, or drop")
+        if insert is not None:
+            return variation.with_insertion(self, k, insert)
+        return variation.without(self, k) if drop else variation.with_changes(self, k, moved or {}, choice)
 
     def best_prefix(self) -> "ConstructionSequence":
         """The steps up to the highest total score; of equals the shortest."""

@@ -32,7 +32,7 @@ from autopoly_env.silhouette import Silhouette
 from autopoly_env.tuning import tune
 
 POLISH_RESOLUTION = 512  # of the finest refit; a score may be finer
-_N_POLISHED = 3  # refits at it, each towards more than the IoU of the one before
+_N_REFINED = 3  # refits at it, each towards more than the IoU of the one before
 _BACKGROUND_STEPS = 16  # between weights 0 and 1, so that few targets are prepared
 
 
@@ -288,22 +288,24 @@ class Simulator:
             return replace(state, done="max_steps")
         return state
 
-    def polish(self, mesh: PolyMesh) -> PolyMesh:
-        """The mesh refitted and tuned at the silhouette's own resolution (at most `POLISH_RESOLUTION`).
-
-        No worse than it was: what does not score better is not taken.
-        """
+    def refine(self, mesh: PolyMesh) -> PolyMesh:
+        """The mesh refitted at the silhouette's own resolution (at most `POLISH_RESOLUTION`), as long as that helps."""
         size = min(self.silhouette.resolution, POLISH_RESOLUTION)
-        bonds = self.guidance.bonds(mesh)
         best, score = mesh, self.final_score(mesh)
-        for _ in range(_N_POLISHED):
-            fitted = refit(best, self.refit_target(score.iou, size), LOCAL, bonds).mesh
+        for _ in range(_N_REFINED):
+            fitted = refit(best, self.refit_target(score.iou, size), LOCAL, self.guidance.bonds(mesh)).mesh
             fitted_score = self.final_score(fitted)
             if not fitted_score.total > score.total:
                 break
             best, score = fitted, fitted_score
-        tuned = tune(best, self.silhouette.target(size), bonds)
-        return max((best, tuned), key=lambda candidate: self.final_score(candidate).total)
+        return best
+
+    def polish(self, mesh: PolyMesh) -> PolyMesh:
+        """The mesh refined, then tuned at the same resolution: no worse than it was."""
+        refined = self.refine(mesh)
+        size = min(self.silhouette.resolution, POLISH_RESOLUTION)
+        tuned = tune(refined, self.silhouette.target(size), self.guidance.bonds(mesh))
+        return max((refined, tuned), key=lambda candidate: self.final_score(candidate).total)
 
 
 def _ends_changed(before: PolyMesh, after: PolyMesh) -> set[int]:

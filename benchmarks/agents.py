@@ -15,7 +15,7 @@ from autopoly_env.silhouette import load_silhouette
 from autopoly_env.simulator import Simulator
 from benchmarks.report import Must, Record, Row, quantity
 
-AGENTS = ("greedy", "beam", "trace", "climb")
+AGENTS = ("greedy", "beam", "trace", "decimate", "climb", "mcts")
 WEIGHTS = (0.3, 1.0)  # w_sc
 NO_DEFECTS = Must("<=", 0.0)
 # The floors hold for the silhouettes that they were set on, a folder of this many with a manifest.
@@ -26,6 +26,8 @@ _FLOORS = {
     ("beam", 0.3): 82.5,
     ("trace", 0.3): 82.0,
     ("trace", 1.0): 57.0,
+    ("mcts", 0.3): 83.0,
+    ("mcts", 1.0): 65.5,
 }
 _SECONDS = {"greedy": 0.7, "beam": 6.0, "trace": 0.5}
 

@@ -110,7 +110,7 @@ def test_solve__gives_the_same_twice(name: str) -> None:
 def test_progress__never_goes_back(name: str) -> None:
     reports: list[Progress] = []
     solution = quick(name).solve(simulator("blobs"), on_progress=reports.append)
-    assert reports[-1].n_refits == solution.stats.n_refits
+    assert reports[-1].n_refits <= solution.stats.n_refits  # the finish has no progress to report
     for earlier, later in pairwise(reports):
         assert later.best_total >= earlier.best_total
         assert (later.n_steps, later.n_refits) >= (earlier.n_steps + 1, earlier.n_refits)

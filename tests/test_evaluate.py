@@ -39,7 +39,7 @@ agents:
   - {agent: random, options: {n_steps: 2}}
   - {agent: dr-simple, printed: {r_sm: 0.732, r_sc: 9, r_si: 0, r_all: 62.2}}
   - {agent: trace, label: thrifty, weights: {w_sc: 30}}
-  - {agent: oracle, missing: no weights yet}
+  - {agent: soothsayer, missing: no weights yet}
 """
 LABELS = ["ground truth", "trace", "random", "dr-simple", "thrifty"]
 TIMES = ("seconds", "seconds_low", "seconds_high")
@@ -127,7 +127,7 @@ def test_run_folder__has_the_suite_the_targets_and_whole_lines(run: Run) -> None
     assert sorted(os.listdir("out/targets")) == [f"{name}.png" for name in names]
     assert list(lines("out")[0]) == [
         *("agent", "target", "seed", "r_sm", "r_sc", "r_si", "r_all", "V", "E", "F", "flipped_faces"),
-        *("n_actions", "n_refits", "seconds", "stopped_by", "curve", "mesh", "error"),
+        *("n_actions", "n_refits", "seconds", "stopped_by", "curve", "mesh", "valid", "blocking_in", "moved", "error"),
     ]
     assert all(line["curve"] for line in lines("out") if line["agent"] == "trace")
     assert not any(line["curve"] for line in lines("out") if line["agent"] == "thrifty")  # on another scale
@@ -136,7 +136,7 @@ def test_run_folder__has_the_suite_the_targets_and_whole_lines(run: Run) -> None
 def test_table__has_the_means_the_duel_and_what_is_missing_or_printed(run: Run) -> None:
     done = run("tiny.yaml", "--out", "out")
     rows = {row["agent"]: row for row in table("out")}
-    assert list(rows) == [*LABELS, "oracle"]
+    assert list(rows) == [*LABELS, "soothsayer"]
     totals = {label: [line["r_all"] for line in lines("out") if line["agent"] == label] for label in LABELS}
     for label in LABELS:
         assert float(rows[label]["r_all"]) == pytest.approx(np.mean(totals[label]))
@@ -144,7 +144,7 @@ def test_table__has_the_means_the_duel_and_what_is_missing_or_printed(run: Run) 
         wins = sum(a > b for a, b in zip(totals[label], totals["trace"], strict=True))
         losses = sum(a < b for a, b in zip(totals[label], totals["trace"], strict=True))
         assert (int(rows[label]["wins"]), int(rows[label]["losses"])) == (wins, losses)
-    assert (rows["oracle"]["note"], rows["oracle"]["r_all"]) == ("no weights yet", "")
+    assert (rows["soothsayer"]["note"], rows["soothsayer"]["r_all"]) == ("no weights yet", "")
     assert rows["dr-simple"]["printed_r_all"] == "62.2"
     for text in (done.out, Path("out/table.md").read_text()):
         assert "(no weights yet)" in text
@@ -163,7 +163,7 @@ def test_row_with_other_weights__searches_with_them(run: Run) -> None:
 def test_json__prints_the_rows_and_nothing_else(run: Run) -> None:
     done = run("tiny.yaml", "--out", "out", "--json", "--baseline", "random", "--agents", "random,trace")
     rows = [json.loads(line) for line in done.out.splitlines()]
-    assert [row["agent"] for row in rows] == ["trace", "random", "oracle"]
+    assert [row["agent"] for row in rows] == ["trace", "random", "soothsayer"]
     assert rows[1]["wins"] == rows[1]["losses"] == 0
     assert rows[0]["shapes"] == 3
 

@@ -69,7 +69,7 @@ def test_weights__refuse_what_is_negative_or_not_finite(name: str, value: float)
 
 
 def test_weights__are_those_of_the_paper_by_default_and_may_be_zero() -> None:
-    assert asdict(ScoreWeights()) == {"w_sm": 100.0, "w_sc": 0.3, "w_si": 5.0}
+    assert asdict(ScoreWeights()) == {"w_sm": 100.0, "w_sc": 0.3, "w_si": 5.0, "w_locality": 0.0}
     assert score(HALF, painted(SQUARE, 8).target(8), ScoreWeights(0.0, 0.0, 0.0)).total == 0.0
 
 

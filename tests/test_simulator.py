@@ -18,6 +18,7 @@ from autopoly_env.mesh import PolyMesh, is_valid
 from autopoly_env.operators import OPERATORS, n_elements
 from autopoly_env.parallel import set_threads
 from autopoly_env.placement import defects_of
+from autopoly_env.refit import LOCAL, refit
 from autopoly_env.score import ScoreWeights, score
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import Silhouette
@@ -392,3 +393,40 @@ def test_polish__never_lowers_the_score(target: int, seed: int) -> None:
         polished = game.polish(after.mesh)
         assert polished.topology is after.mesh.topology
         assert game.final_score(polished).total >= game.final_score(after.mesh).total
+
+
+# --- what a refit aims at ---
+
+
+def disc() -> Silhouette:
+    y, x = np.mgrid[:96, :96]
+    return Silhouette((x - 47.5) ** 2 + (y - 47.5) ** 2 < 36**2)
+
+
+def test_refit_target__weighs_the_background_by_the_iou_to_a_sixteenth() -> None:
+    game = Simulator(disc(), resolution=32)
+    picture = game.refit_target(0.51).pictures[-1]
+    assert picture.weight_sum is not None
+    covered = game.silhouette.target(32).coverage
+    assert np.allclose(np.diff(picture.weight_sum), covered + 0.5 * (1.0 - covered), atol=1e-6)
+    assert game.refit_target(1.0).pictures[-1].weight_sum is None
+    assert game.refit_target(0.52) is game.refit_target(0.48)
+
+
+def test_refit_target__makes_the_iou_larger_than_least_squares_do() -> None:
+    game = Simulator(disc(), resolution=96)
+    angles = np.pi * np.array([1 / 6, 5 / 6, 3 / 2])
+    triangle = PolyMesh.from_faces(0.5 + 0.4 * np.column_stack((np.cos(angles), np.sin(angles))), [(0, 1, 2)])
+    plain = refit(triangle, game.refit_target(1.0), LOCAL).mesh
+    iou = game.final_score(plain).iou
+    aimed = refit(plain, game.refit_target(iou), LOCAL).mesh
+    assert game.final_score(aimed).iou > iou + 0.002
+    assert aimed.face_areas().sum() > plain.face_areas().sum()  # more of the disc for a little more of the outside
+
+
+def test_polish__is_never_worse_at_the_silhouettes_own_resolution() -> None:
+    game = Simulator(disc(), resolution=32)
+    for n in (3, 5, 8):
+        angles = 2 * np.pi * np.arange(n) / n
+        ring = PolyMesh.from_faces(0.5 + 0.37 * np.column_stack((np.cos(angles), np.sin(angles))), [tuple(range(n))])
+        assert game.final_score(game.polish(ring)).total > game.final_score(ring).total

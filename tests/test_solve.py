@@ -31,10 +31,10 @@ from tests.shapes import shapely_coverage
 ROOT = Path(__file__).parent.parent
 EXAMPLES = ROOT / "examples"
 QUICK = ("--resolution", "64")
-COLUMNS = ["name", "r_sm", "r_sc", "r_si", "r_all", "actions", "refits", "seconds"]
+COLUMNS = ["name", "r_sm", "r_sc", "r_si", "r_all", "actions", "valid", "blocking_in", "moved", "refits", "seconds"]
 RECORD_KEYS = [
     *("image", "name", "agent", "settings", "seed", "r_sm", "r_sc", "r_si", "r_all", "V", "E", "F"),
-    *("actions", "refits", "seconds", "stopped_by", "notes", "files"),
+    *("actions", "valid", "blocking_in", "moved", "refits", "seconds", "stopped_by", "notes", "files"),
 ]
 
 
@@ -430,8 +430,8 @@ def test_ctrl_c_in_the_shell__leaves_finished_images_whole() -> None:
 
 
 def test_simulations__limit_a_tree_search_and_are_refused_by_others(run: Run) -> None:
-    image = small_image("box.png")
-    done = run(image, "--agent", "mcts", "--option", "seeds=[]", "--simulations", 0, "--json")
+    image = EXAMPLES / "chair.png"
+    done = run(image, "--agent", "mcts", "--option", "seeds=[]", "--simulations", 0, "--json", *QUICK)
     assert json.loads(done.out)["stopped_by"] == "simulations"
     refused = run(image, "--agent", "trace", "--simulations", 3)
     assert refused.code == 2 and "trace runs no simulations" in refused.err

@@ -61,6 +61,9 @@ class Outcome:
     stopped_by: str  # as in `agents.base.Stats`
     curve: list[tuple[int, float, float]]  # refits, seconds, best r_all so far, at the resolution of the search
     mesh: MeshData
+    valid: float | None = None  # these three as in `autopoly_env.lesson.Lesson`; older records have none
+    blocking_in: float | None = None
+    moved: float | None = None
 
 
 @dataclass(frozen=True)
@@ -88,9 +91,9 @@ class Record:
     def from_json(cls, line: str | bytes) -> "Record":
         """The record in a line. Raises ValueError, in one line, if it is none."""
         values = json.loads(line, parse_constant=_refuse)
-        if not isinstance(values, dict) or set(values) != RECORD_FIELDS:
+        if not isinstance(values, dict) or {*values, *_LESSON_FIELDS} != RECORD_FIELDS:
             raise ValueError(f"expected an object with the keys {', '.join(sorted(RECORD_FIELDS))}")
-        outcome = {name: values.pop(name) for name in OUTCOME_FIELDS}
+        outcome = {name: values.pop(name, None) for name in OUTCOME_FIELDS}
         is_failed = all(value is None for value in outcome.values())
         try:
             return _RECORD.validate_python({**values, "outcome": None if is_failed else outcome})
@@ -100,6 +103,7 @@ class Record:
 
 
 OUTCOME_FIELDS = tuple(field.name for field in fields(Outcome))
+_LESSON_FIELDS = ("valid", "blocking_in", "moved")
 RECORD_FIELDS = {"agent", "target", "seed", *OUTCOME_FIELDS, "error"}
 _RECORD = TypeAdapter(Record)
 

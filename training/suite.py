@@ -22,6 +22,7 @@ from training.options import build_config
 from training.suite_targets import TargetSpec
 
 FOLDER = Path(__file__).parent.parent / "configs" / "suite"
+WeightName = Literal["w_sm", "w_sc", "w_si", "w_locality"]
 GROUND_TRUTH = "ground truth"  # the row of the meshes that targets were made from
 
 
@@ -46,7 +47,7 @@ class Entry:
     agent: str  # as in agents/registry.py
     label: str = ""  # the agent's name if empty
     options: dict[str, Any] = field(default_factory=dict)
-    weights: dict[Literal["w_sm", "w_sc", "w_si"], float] = field(default_factory=dict)  # of its search, not its score
+    weights: dict[WeightName, float] = field(default_factory=dict)  # of its search, not its score
     operators: str | None = None  # the suite's
     budget: Budget | None = None  # the suite's
     missing: str | None = None  # what the row says where there is no such agent; that is an error without it

@@ -11,8 +11,10 @@ from PIL import Image
 
 from agents.base import Budget, Progress
 from autopoly_env.errors import AutoPolyError
+from autopoly_env.lesson import Lesson
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.score import Score
+from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import Silhouette
 from training.parallel import one_line
 from training.records import TARGET_SIZE, MeshData, Outcome, Record
@@ -92,7 +94,7 @@ def _solved(suite: Suite, task: Task, silhouette: Silhouette) -> Outcome:
     return _outcome(
         solution.mesh,
         score,
-        n_actions=len(solution.sequence.steps),
+        solution.sequence,
         n_refits=solution.stats.n_refits,
         seconds=seconds,
         stopped_by=solution.stats.stopped_by,
@@ -107,13 +109,12 @@ def _known(suite: Suite, task: Task, silhouette: Silhouette) -> Outcome:
         raise AutoPolyError(f"{task.target.name}: it is not known how this target was made")
     mesh = sequence.final()
     score = suite.simulator(silhouette).final_score(mesh)
-    return _outcome(
-        mesh, score, n_actions=len(sequence.steps), n_refits=0, seconds=0.0, stopped_by="finished", curve=[]
-    )
+    return _outcome(mesh, score, sequence, n_refits=0, seconds=0.0, stopped_by="finished", curve=[])
 
 
-def _outcome(mesh: PolyMesh, score: Score, **work: Any) -> Outcome:
-    """A mesh, its score, and what it took."""
+def _outcome(mesh: PolyMesh, score: Score, sequence: ConstructionSequence, **work: Any) -> Outcome:
+    """A mesh, its score, how its construction reads, and what it took."""
+    lesson = Lesson.of(sequence)
     n_vertices, n_edges, n_faces = mesh.counts
     return Outcome(
         r_sm=score.iou,
@@ -124,7 +125,11 @@ def _outcome(mesh: PolyMesh, score: Score, **work: Any) -> Outcome:
         E=n_edges,
         F=n_faces,
         flipped_faces=int((mesh.face_areas() <= 0.0).sum()),
+        n_actions=lesson.n_actions,
         mesh=MeshData.of(mesh),
+        valid=lesson.valid,
+        blocking_in=lesson.blocking_in,
+        moved=lesson.moved,
         **work,
     )
 

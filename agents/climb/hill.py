@@ -44,8 +44,12 @@ class Hill:
         target = self.simulator.refit_target(iou)
         return map_threads(lambda outline: self.place(outline.refitted(target, config)), outlines)
 
+    def refined(self, place: Place) -> Place:
+        """The outline refitted at the silhouette's own resolution."""
+        return self.place(place.outline.moved(self.simulator.refine(place.outline.loops)))
+
     def polished(self, place: Place) -> Place:
-        """The outline refitted and tuned as a finished mesh is (`Simulator.polish`)."""
+        """The outline refitted and tuned, as a finished mesh is."""
         return self.place(place.outline.moved(self.simulator.polish(place.outline.loops)))
 
 

@@ -4,9 +4,11 @@ from agents.climb.hill import Hill, Place, total_of
 from agents.trace.agent import build_best
 from agents.trace.outline import outline_of_mesh
 from autopoly_env.mesh import PolyMesh
+from autopoly_env.parallel import map_threads
 from autopoly_env.simulator import State
 
-_N_KEPT = 6  # which of them is the best shows when they are polished
+_N_KEPT = 6  # which of them is the best shows when they are refitted more finely
+_N_POLISHED = 2  # of those
 _N_BUILT = 3
 
 
@@ -37,5 +39,7 @@ class Tops:
 
     def built(self) -> list[State]:
         """The construction of the best place, as they are when they are polished."""
-        polished = sorted(map(self.hill.polished, self._places), key=total_of, reverse=True)
-        return build_best(self.hill.simulator, [place.outline for place in polished], _N_BUILT)
+        refined = sorted(map_threads(self.hill.refined, self._places), key=total_of, reverse=True)
+        polished = sorted(map_threads(self.hill.polished, refined[:_N_POLISHED]), key=total_of, reverse=True)
+        places = [*polished, *refined[_N_POLISHED:]]
+        return build_best(self.hill.simulator, [place.outline for place in places], _N_BUILT)

@@ -39,7 +39,9 @@ def _solve_within(agent: Agent, simulator: Simulator, meter: Meter) -> Solution:
         meter.count(n_new, progress.best_total)
 
     budget = replace(meter.rest().share(SHARE), simulations=None)
-    return agent.solve(simulator, budget, report)
+    solution = agent.solve(simulator, budget, report)
+    meter.add_refits(solution.stats.n_refits - n_counted)
+    return solution
 
 
 def track_of(simulator: Simulator, sequence: ConstructionSequence) -> Track:

@@ -5,6 +5,7 @@ it begins at the best shape that other agents have found, and again at the recta
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -59,31 +60,31 @@ class MctsAgent(Agent):
         """As every agent; never worse than the incumbents. A budget without limits is one of `config.n_refits`."""
         unlimited = budget is None or budget == Budget()
         meter = Meter(Budget(self._config.n_refits) if unlimited or budget is None else budget, on_progress)
-        incumbents: list[Solution] = []
-        tops = Tops(Hill(simulator)) if self._hops(simulator) else None
-        initial = best = Track(simulator.initial())
+        finds = _Finds(Track(simulator.initial()), Tops(Hill(simulator)) if self._hops(simulator) else None)
         try:
-            meter.add([best.state])
-            for solution in play(self._incumbents, simulator, meter):
-                incumbents.append(solution)
-                best = _better(best, track_of(simulator, solution.sequence))
-            for start in [best] if best is initial else [best, initial]:
-                part = meter.part(1.0 if tops is None else _TREE_SHARE)
-                for track in self._search(simulator, start, part):
-                    best = _better(best, track)
-            if tops is not None:
-                for mesh in (best.state.mesh, *(solution.mesh for solution in incumbents)):
-                    tops.add_mesh(mesh)
-                rng = np.random.default_rng(self._config.seed)
-                for top in hop(tops.hill, tops.places(), self._config.hop_patience, rng, meter):
-                    tops.add(top)
+            meter.add([finds.best.state])
+            if not finds.best.state.done:
+                self._run_stages(simulator, finds, meter)
         except KeyboardInterrupt:
             meter.stopped_by = "interrupted"
-        found = [*incumbents, finish(simulator, best.states(), meter)]
-        if tops is not None and tops.places():
-            found.append(finish(simulator, tops.built(), meter))
-        chosen = max(found, key=lambda solution: solution.score.total)
-        return Solution(chosen.sequence, chosen.mesh, chosen.score, meter.stats())
+        return finds.solution(simulator, meter)
+
+    def _run_stages(self, simulator: Simulator, finds: "_Finds", meter: Meter) -> None:
+        """Seeds; a tree from the best shape and one from the rectangle; hops from outline to outline."""
+        initial = finds.best
+        for solution in play(self._incumbents, simulator, meter):
+            finds.incumbents.append(solution)
+            finds.offer(track_of(simulator, solution.sequence))
+        for start in [initial] if finds.best is initial else [finds.best, initial]:
+            part = meter.part(1.0 if finds.tops is None else _TREE_SHARE)
+            for track in self._search(simulator, start, part):
+                finds.offer(track)
+        if finds.tops is not None:
+            for mesh in (finds.best.state.mesh, *(solution.mesh for solution in finds.incumbents)):
+                finds.tops.add_mesh(mesh)
+            rng = np.random.default_rng(self._config.seed)
+            for top in hop(finds.tops.hill, finds.tops.places(), self._config.hop_patience, rng, meter):
+                finds.tops.add(top)
 
     def _hops(self, simulator: Simulator) -> bool:
         """Whether the search goes on among outlines, which heed no guidance."""
@@ -107,9 +108,26 @@ class MctsAgent(Agent):
             root = chosen if self._config.reuse_tree else Node(chosen.track)
 
 
-def _better(first: Track, second: Track) -> Track:
-    """The track to the better shape; of equals the first."""
-    return second if second.state.score.total > first.state.score.total else first
+@dataclass
+class _Finds:
+    """What the stages of a search have found so far."""
+
+    best: Track
+    tops: Tops | None  # None where the search does not go on among outlines
+    incumbents: list[Solution] = field(default_factory=list)
+
+    def offer(self, track: Track) -> None:
+        """Keep the track if it leads to a better shape than the best so far."""
+        if track.state.score.total > self.best.state.score.total:
+            self.best = track
+
+    def solution(self, simulator: Simulator, meter: Meter) -> Solution:
+        """The best of everything, finished."""
+        found = [*self.incumbents, finish(simulator, self.best.states(), meter)]
+        if self.tops is not None and self.tops.places():
+            found.append(finish(simulator, self.tops.built(), meter))
+        chosen = max(found, key=lambda solution: solution.score.total)
+        return Solution(chosen.sequence, chosen.mesh, chosen.score, meter.stats())
 
 
 class PaperMctsAgent(MctsAgent):

@@ -1,0 +1,47 @@
+"""Take away from a finished shape what it does not need: a last greedy search among the actions that remove."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from agents.tidy import REMOVING
+from autopoly_env.actions import STOP, Action
+from autopoly_env.errors import IllegalActionError
+from autopoly_env.operators import OPERATORS
+from autopoly_env.placement import is_sane
+from autopoly_env.simulator import Simulator, State
+
+_N_TRIED = 4  # removals that are refitted, those that are worth most as they are
+
+
+def pare(simulator: Simulator, states: Sequence[State]) -> tuple[list[State], int, int]:
+    """The states, and those of removing actions after them as long as each scores better; the numbers of refits that it
+    took, and of actions that were added.
+
+    Only actions that the simulator allows are taken, and none where nothing has been done or the steps are used up.
+    """
+    pared, n_refits, n_added = [state for state in states if state.action != STOP], 0, 0
+    while len(pared) > 1 and pared[-1].step < simulator.max_steps:
+        state = replace(pared[-1], done="")
+        children = simulator.transition_all(state, _most_promising(simulator, state))
+        n_refits += sum(child.n_refits for child in children)
+        sane = (child for child in children if is_sane(child.mesh))
+        best = max(sane, key=lambda child: child.score.total, default=state)
+        if best.score.total <= state.score.total:
+            break
+        pared.append(best)
+        n_added += 1
+    return pared, n_refits, n_added
+
+
+def _most_promising(simulator: Simulator, state: State) -> list[Action]:
+    """The removing actions that are worth most before any refit."""
+
+    def worth(action: Action) -> float:
+        try:
+            after = OPERATORS[action.operator].apply(state.mesh, action.element)
+        except IllegalActionError:
+            return float("-inf")
+        return simulator.score(after).total
+
+    actions = [action for action in simulator.legal_actions(state) if action.operator in REMOVING]
+    return sorted(actions, key=worth, reverse=True)[:_N_TRIED]

@@ -1,0 +1,154 @@
+"""The command `python -m agents.retarget`: the steps of a construction, told again for another silhouette."""
+
+import json
+import sys
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from autopoly_env.errors import AutoPolyError, ConfigError, SequenceError
+
+if TYPE_CHECKING:
+    from agents.retargeting import Retargeted
+    from autopoly_env.sequence import ConstructionSequence
+    from autopoly_env.silhouette import Silhouette
+    from autopoly_env.simulator import Simulator
+
+FAILURE, USAGE_ERROR, INTERRUPTED = 1, 2, 130
+STOPPED = "stopped by Ctrl-C; the files that were written are whole"
+
+HELP = """Tell the steps of a construction again for another silhouette, and mend them where they do not fit.
+
+\b
+Examples:
+  python -m agents.retarget out/chair/sequence.json other_chair.png
+  python -m agents.retarget out/mug/sequence.json jug.png --refits 1000 --out jugs
+
+\b
+OUT/<name of the image without its ending>/ gets what agents.solve writes: sequence.json,
+mesh.obj, mesh.svg, steps.png and player.html. The sequence replays from its own start.
+
+\b
+Printed are r_all on the new image: of the mesh as it was, of the same steps refitted,
+and in the end, after steps were left out and added (docs/variations.md).
+
+Ctrl-C writes the best so far and stops; a second one aborts at once.
+Exit codes: 0 all is well, 1 something failed, 2 wrong usage, 130 Ctrl-C.
+"""
+
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode="rich")
+
+
+@app.command(help=HELP, context_settings={"help_option_names": ["-h", "--help"]})
+def retarget(
+    source: Annotated[Path, typer.Argument(metavar="SEQUENCE", help="A sequence as agents.solve writes it (JSON).")],
+    image: Annotated[Path, typer.Argument(metavar="NEW_IMAGE", help="The silhouette to build instead.")],
+    refits: Annotated[int, typer.Option(help="Limit of refits.")] = 300,
+    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out"),
+    as_json: Annotated[bool, typer.Option("--json", help="Print a JSON record, no table.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar, no notes.")] = False,
+) -> int:
+    """Read both, retarget, write the results; return the exit code."""
+    from agents.base import Budget
+    from agents.retargeting import retarget as work
+    from agents.solve_files import Result, claim_folder, write_results
+    from agents.solve_report import Report
+    from agents.solve_run import CtrlC, name_jobs
+    from autopoly_env.sequence import ConstructionSequence
+    from autopoly_env.silhouette import load_silhouette
+
+    budget = Budget(refits=refits)
+    sequence = ConstructionSequence.load(source)
+    [job] = name_jobs([image], out)
+    silhouette = load_silhouette(image, name=job.name)
+    simulator = _simulator(source, sequence, silhouette)
+    _check_not_overwritten(source, out / job.name)
+    claim_folder(out)
+    with CtrlC() as ctrl_c, Report(1, quiet=quiet or as_json) as report:
+        report.begin(job.name)
+        try:
+            with ctrl_c.searching():
+                done = work(simulator, sequence, budget, report.progress)
+            told = replace(done.solution.sequence, settings={**done.solution.sequence.settings, **_notes_of(done)})
+            solution = replace(done.solution, sequence=told)
+            files = write_results(out / job.name, solution, silhouette, ctrl_c.shielded)
+        except KeyboardInterrupt:
+            return INTERRUPTED
+        if as_json:
+            print(json.dumps({"image": str(image), **_record(done), "sequence": str(files["sequence.json"])}))
+        else:
+            report.solved(Result(image, job.name, solution, silhouette.notes, files))
+            report.finish(None)
+            print(_words(done, len(sequence.steps)))
+        return INTERRUPTED if ctrl_c.n_pressed else 0
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command; whatever is wrong is told in one line on stderr. Returns the exit code."""
+    try:
+        code = app(arguments, prog_name="python -m agents.retarget", standalone_mode=False) or 0
+        return _complain(STOPPED, code) if code == INTERRUPTED else code
+    except ConfigError as error:
+        return _complain(str(error), USAGE_ERROR)
+    except AutoPolyError as error:
+        return _complain(str(error), FAILURE)
+    except Exception as error:
+        if not hasattr(error, "format_message"):  # which typer's own usage errors have
+            raise
+        return _complain(f"{error.format_message()} (see --help)", USAGE_ERROR)
+
+
+def _complain(message: str, exit_code: int) -> int:
+    print("error:", " ".join(message.split()), file=sys.stderr)
+    return exit_code
+
+
+def _simulator(source: Path, sequence: "ConstructionSequence", silhouette: "Silhouette") -> "Simulator":
+    """The rules that the sequence was made under, as far as it tells them. Raises SequenceError for unknown ones."""
+    from autopoly_env.simulator import Simulator
+    from autopoly_env.variation import weights_of
+
+    operators, resolution = sequence.settings.get("operators", "full"), sequence.settings.get("resolution", 128)
+    try:
+        return Simulator(
+            silhouette,
+            operators=str(operators),
+            resolution=resolution if isinstance(resolution, int) else 128,
+            weights=weights_of(sequence.settings),
+            max_steps=max(100, len(sequence.steps)),
+        )
+    except ConfigError as error:
+        raise SequenceError(f"{source}: settings: {error}") from None
+
+
+def _check_not_overwritten(source: Path, folder: Path) -> None:
+    if source.resolve() == (folder / "sequence.json").resolve():
+        raise ConfigError(f"the results would overwrite {source}; give another folder with --out")
+
+
+def _notes_of(done: "Retargeted") -> dict[str, Any]:
+    """What a construction sequence keeps beside the simulator's settings."""
+    return {"agent": "retarget", "kept": done.n_kept, "dropped": done.n_dropped, "added": done.n_added}
+
+
+def _record(done: "Retargeted") -> dict[str, Any]:
+    return {
+        **_notes_of(done),
+        "before": asdict(done.before),
+        "refitted": asdict(done.refitted),
+        "after": asdict(done.solution.score),
+        "n_refits": done.solution.stats.n_refits,
+    }
+
+
+def _words(done: "Retargeted", n_steps: int) -> str:
+    totals = (
+        f"{done.before.total:.2f} as it was, {done.refitted.total:.2f} refitted, {done.solution.score.total:.2f} now"
+    )
+    return f"steps: {done.n_kept} of {n_steps} kept, {done.n_dropped} dropped, {done.n_added} added\nr_all: {totals}"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,184 @@
+"""Retargeting: the steps of one construction, told again for another silhouette, and mended where they do not fit.
+
+First the last mesh is laid over the new target - by bounding box, by moments, or each boundary loop on the contour
+nearest to it - as it is or mirrored, and refitted from afar; every earlier mesh follows with its vertices. Then the
+construction itself is climbed: of all that are one step shorter (later steps that have lost their element go, too) or
+one step longer, refitted, the best is taken while it is better.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from agents.base import Budget, Meter, Progress, Solution, finish
+from agents.trace.rings import signed_area, trace_rings
+from agents.trace.simplify import Contour
+from agents.versions import Version, first_settled, neighbours, total_of, version_of
+from autopoly_env.arrays import FloatArray
+from autopoly_env.errors import AutoPolyError, SequenceError
+from autopoly_env.follower import Follower, Taken
+from autopoly_env.mesh import PolyMesh
+from autopoly_env.parallel import map_threads
+from autopoly_env.raster import coverage
+from autopoly_env.refit import FROM_AFAR, LOCAL, THOROUGH, RefitConfig, refit
+from autopoly_env.score import Score
+from autopoly_env.sequence import ConstructionSequence
+from autopoly_env.simulator import Simulator
+from autopoly_env.variation import mirrored, stay
+
+_N_TRIED = 10  # neighbours that are refitted, those that are best as they are
+_N_THOROUGH = 3  # constructions that are refitted again, harder, before the climb ends
+_LEAST_GAIN = 1e-9
+_N_BEGINNINGS = 3  # ways to lay the construction over the target that are climbed from, while the budget lasts
+
+
+@dataclass(frozen=True)
+class Retargeted:
+    """A construction for the new target, and what has become of the given one's steps."""
+
+    solution: Solution
+    n_kept: int
+    n_dropped: int
+    n_added: int
+    before: Score  # of the given last mesh, as it is, on the new target
+    refitted: Score  # of the same steps, none lost or added, laid over the new target and refitted
+    aligned: PolyMesh  # which that is the score of
+
+
+def retarget(
+    simulator: Simulator,
+    sequence: ConstructionSequence,
+    budget: Budget,
+    on_progress: Callable[[Progress], None] | None = None,
+) -> Retargeted:
+    """Tell `sequence` again for the simulator's target. KeyboardInterrupt ends the search with the best so far.
+
+    All scores are at the silhouette's own resolution. Raises SequenceError as `align`.
+    """
+    meter = Meter(budget, on_progress)
+    beginnings = align(simulator, sequence, meter)
+    version = beginnings[0]
+    try:
+        for beginning in beginnings:
+            for better in improve(simulator, beginning, meter):
+                version = max(version, better, key=total_of)
+    except KeyboardInterrupt:
+        meter.stopped_by = "interrupted"
+    solution = finish(simulator, version.states(simulator), meter, keep_steps=True)
+    n_steps = len(solution.sequence.steps)
+    n_kept = sum(origin is not None for origin in version.origins[:n_steps])
+    aligned = beginnings[0].mesh
+    before, refitted = simulator.final_score(sequence.final()), simulator.final_score(aligned)
+    n_dropped = len(sequence.steps) - n_kept
+    return Retargeted(solution, n_kept, n_dropped, n_steps - n_kept, before, refitted, aligned)
+
+
+def align(simulator: Simulator, sequence: ConstructionSequence, meter: Meter) -> list[Version]:
+    """The construction laid over the target in a few ways, the best first; no step is lost or added.
+
+    Raises SequenceError where no way leaves it without crossings and flipped faces.
+    """
+    found = [
+        version_of(simulator, told.start, _taken(told), range(1, len(told.steps) + 1), laid)
+        for told in _both_ways(sequence)
+        for laid in _laid_over(told.final(), simulator)
+    ]
+    from_afar = _refitted(simulator, found, FROM_AFAR)
+    again = _refitted(simulator, from_afar, THOROUGH)
+    fitted = [max(one, other, key=total_of) for one, other in zip(from_afar, again, strict=True)]
+    aligned = [first_settled(simulator, [one]) for one in sorted(fitted, key=total_of, reverse=True)]
+    settled = [one for one in aligned if one is not None]
+    meter.count(2 * len(found), max(map(total_of, settled), default=float("-inf")))
+    if not settled:
+        raise SequenceError("its steps cannot be laid over the target without crossings; give another sequence")
+    return settled[:_N_BEGINNINGS]
+
+
+def improve(simulator: Simulator, version: Version, meter: Meter) -> Iterator[Version]:
+    """Better and better constructions, each a step shorter or longer than the one before it."""
+    better: Version | None = version
+    while better is not None and not meter.spent():
+        version, better = better, None
+        hopeful = sorted(neighbours(simulator, version), key=total_of, reverse=True)
+        found: list[Version] = []
+        for part in (hopeful[:_N_TRIED], hopeful[_N_TRIED:]):
+            if better is None and not meter.spent():
+                fitted = _refitted(simulator, part[: meter.rest().refits], LOCAL)
+                meter.count(len(fitted), version.total)
+                better = first_settled(simulator, _above(fitted, version))
+                found += fitted
+        if better is None and not meter.spent():
+            best = sorted(found, key=total_of, reverse=True)[:_N_THOROUGH]
+            harder = _refitted(simulator, [version, *best][: meter.rest().refits], THOROUGH)
+            meter.count(len(harder), version.total)
+            better = first_settled(simulator, _above(harder, version))
+        if better is not None:
+            yield better
+
+
+def _above(found: Sequence[Version], version: Version) -> list[Version]:
+    return [one for one in found if one.total > version.total + _LEAST_GAIN]
+
+
+def _taken(sequence: ConstructionSequence) -> list[Taken]:
+    meshes = sequence.meshes()
+    follower = Follower(meshes[0], meshes[0])
+    return [follower.take(step, meshes[i], meshes[i + 1], stay) for i, step in enumerate(sequence.steps)]
+
+
+def _both_ways(sequence: ConstructionSequence) -> Iterator[ConstructionSequence]:
+    yield sequence
+    try:
+        yield mirrored(sequence)
+    except AutoPolyError:  # whatever cannot be told the other way round
+        return
+
+
+def _laid_over(mesh: PolyMesh, simulator: Simulator) -> Iterator[PolyMesh]:
+    """The mesh over the target: by the bounding boxes, and by their moments."""
+    mask = simulator.silhouette.mask
+    rows, columns = np.nonzero(mask)
+    pixels = (np.column_stack((columns, rows)) + 0.5) / len(mask)
+    low, high = pixels.min(axis=0), pixels.max(axis=0)
+    own_low, own_high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    boxed = mesh.with_vertices(low + (mesh.vertices - own_low) * (high - low) / np.maximum(own_high - own_low, 1e-6))
+    yield boxed
+    yield _on_contours(boxed, simulator)
+    own = _inside(mesh)
+    if len(own) > 2:
+        stretch = np.sqrt(pixels.var(axis=0) / np.maximum(own.var(axis=0), 1e-9))
+        yield mesh.with_vertices(np.clip(pixels.mean(axis=0) + (mesh.vertices - own.mean(axis=0)) * stretch, 0.0, 1.0))
+
+
+def _on_contours(mesh: PolyMesh, simulator: Simulator) -> PolyMesh:
+    """The mesh, roughly in place, with each boundary loop on the best polygon of its size of the nearest contour."""
+    rings, vertices = trace_rings(simulator.silhouette), mesh.vertices.copy()
+    for loop in sorted(mesh.topology.boundary_loops, key=lambda loop: -abs(signed_area(mesh.vertices[loop]))):
+        points = mesh.vertices[loop]
+        alike = [r for r in rings if r.is_hole == (signed_area(points) < 0.0) and len(r.points) > len(points)]
+        if not alike:
+            continue
+        ring = min(alike, key=lambda r: float(((r.points.mean(axis=0) - points.mean(axis=0)) ** 2).sum()))
+        rings = [one for one in rings if one is not ring]
+        polygon = Contour(ring.points).polygon(len(points))
+        turns = [np.roll(polygon, turn, axis=0) for turn in range(len(polygon))]
+        vertices[loop] = min(turns, key=lambda turned: float(((turned - points) ** 2).sum()))
+    return mesh.with_vertices(vertices)
+
+
+def _inside(mesh: PolyMesh) -> FloatArray:
+    """(P, 2) the pixels that a mesh covers."""
+    rows, columns = np.nonzero(coverage(mesh, 128) >= 0.5)
+    points: FloatArray = (np.column_stack((columns, rows)) + 0.5) / 128
+    return points
+
+
+def _refitted(simulator: Simulator, versions: Sequence[Version], config: RefitConfig) -> list[Version]:
+    """Each with its last mesh refitted, on all cores."""
+
+    def fit(version: Version) -> Version:
+        mesh = refit(version.mesh, simulator.refit_target(version.score.iou), config).mesh
+        return replace(version, mesh=mesh, score=simulator.score(mesh))
+
+    return map_threads(fit, versions)

@@ -1,0 +1,164 @@
+"""The command `python -m agents.vary`: variants of a construction, an early step edited and carried on to the end."""
+
+import math
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from autopoly_env.errors import AutoPolyError, ConfigError, SequenceError
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+    from agents.solve_run import CtrlC
+    from agents.variants import Variant
+    from autopoly_env.arrays import ByteArray
+    from autopoly_env.mesh import PolyMesh
+
+FAILURE, USAGE_ERROR, INTERRUPTED = 1, 2, 130
+SHEET = "variants.png"
+CELL_SIZE = 256  # pixels of a mesh on the sheet
+MOST = 200  # variants
+STOPPED = "stopped by Ctrl-C; the files that were written are whole"
+
+HELP = """Make variants of a construction: an early step is edited, the later ones come along.
+
+\b
+Examples:
+  python -m agents.vary out/chair/sequence.json
+  python -m agents.vary out/chair/sequence.json --n 20 --amount 0.2 --seed 1 --out chairs
+
+\b
+OUT/variants.png shows all of them, the given mesh first. OUT/variant-1/, OUT/variant-2/, ...
+get what agents.solve writes: sequence.json, mesh.obj, mesh.svg, steps.png, player.html.
+No mesh on the way crosses itself or has a flipped face (docs/variations.md).
+
+Exit codes: 0 all is well, 1 something failed, 2 wrong usage, 130 Ctrl-C.
+"""
+
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode="rich")
+
+
+@app.command(help=HELP, context_settings={"help_option_names": ["-h", "--help"]})
+def vary(
+    source: Annotated[Path, typer.Argument(metavar="SEQUENCE", help="A sequence as agents.solve writes it (JSON).")],
+    n: Annotated[int, typer.Option("--n", help="How many variants.")] = 8,
+    amount: Annotated[float, typer.Option(help="How far an edit pulls, in the unit square.")] = 0.12,
+    seed: Annotated[int, typer.Option(help="Of the random numbers.")] = 0,
+    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/variants"),
+    quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar, no notes.")] = False,
+) -> int:
+    """Check the options, then draw and write one variant after the other; return the exit code."""
+    from agents.solve_files import claim_folder
+    from agents.solve_run import CtrlC
+    from agents.variants import check_sound, draw_variants
+    from autopoly_env.sequence import ConstructionSequence
+
+    _check(n, amount, seed)
+    sequence = ConstructionSequence.load(source)
+    try:
+        check_sound(sequence)
+    except SequenceError as error:
+        raise SequenceError(f"{source}: {error}") from None
+    claim_folder(out)
+    cells, n_failed = [_cell(sequence.final(), "as it was\n")], 0
+    with CtrlC() as ctrl_c, _bar(quiet) as bar:
+        task = bar.add_task("variants", total=n)
+        for number, variant in enumerate(draw_variants(sequence, n, amount, seed), 1):
+            if variant is None:
+                n_failed += 1
+            else:
+                try:
+                    _write(variant, out / f"variant-{number}", ctrl_c)
+                except KeyboardInterrupt:  # the second
+                    return INTERRUPTED
+                cells.append(_cell(variant.sequence.final(), f"variant-{number}\nedited after step {variant.step}"))
+            bar.advance(task)
+            if ctrl_c.n_pressed:
+                break
+        print(f"{len(cells) - 1} variants\nOpen {_save_sheet(cells, out / SHEET)}")
+    if n_failed:
+        raise SequenceError(f"{n_failed} of {n} variants were not found; give a smaller --amount, or fewer with --n")
+    return INTERRUPTED if ctrl_c.n_pressed else 0
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command; whatever is wrong is told in one line on stderr. Returns the exit code."""
+    try:
+        code = app(arguments, prog_name="python -m agents.vary", standalone_mode=False) or 0
+        return _complain(STOPPED, code) if code == INTERRUPTED else code
+    except ConfigError as error:
+        return _complain(str(error), USAGE_ERROR)
+    except AutoPolyError as error:
+        return _complain(str(error), FAILURE)
+    except Exception as error:
+        if not hasattr(error, "format_message"):  # which typer's own usage errors have
+            raise
+        return _complain(f"{error.format_message()} (see --help)", USAGE_ERROR)
+
+
+def _complain(message: str, exit_code: int) -> int:
+    print("error:", " ".join(message.split()), file=sys.stderr)
+    return exit_code
+
+
+def _check(n: int, amount: float, seed: int) -> None:
+    if not 1 <= n <= MOST:
+        raise ConfigError(f"--n {n}: expected 1 to {MOST} variants")
+    if not 0.0 < amount <= 1.0:
+        raise ConfigError(f"--amount {amount}: expected a length in the unit square, above 0, at most 1")
+    if seed < 0:
+        raise ConfigError(f"--seed {seed}: expected at least 0")
+
+
+def _bar(quiet: bool) -> "Progress":
+    from rich.console import Console
+    from rich.progress import Progress
+
+    console = Console(stderr=True)
+    return Progress(console=console, disable=quiet or not console.is_terminal, transient=True, redirect_stdout=False)
+
+
+def _write(variant: "Variant", folder: Path, ctrl_c: "CtrlC") -> None:
+    """Write what `agents.solve` writes, the variant's own last mesh for its target."""
+    from agents.base import Solution, Stats
+    from agents.solve_files import write_results
+    from autopoly_env.score import Score
+    from autopoly_env.variation import picture_of
+
+    sequence, mesh = variant.sequence, variant.sequence.final()
+    told = sequence.steps[-1].score if sequence.steps else sequence.start_score
+    score = Score(told["iou"], int(told["complexity"]), int(told["self_intersections"]), told["total"])
+    solution = Solution(sequence, mesh, score, Stats(0, 0.0, "finished"))
+    write_results(folder, solution, picture_of(mesh, folder.name), ctrl_c.shielded)
+
+
+def _cell(mesh: "PolyMesh", caption: str) -> "ByteArray":
+    from autopoly_env.viewer import draw_mesh
+
+    return draw_mesh(mesh, size=CELL_SIZE, caption=caption)
+
+
+def _save_sheet(cells: "Sequence[ByteArray]", path: Path) -> Path:
+    """Write all cells on one page, about as wide as high."""
+    import numpy as np
+    from PIL import Image
+
+    from autopoly_env.export import save_png
+    from autopoly_env.viewer import PAPER
+
+    height, width, _ = cells[0].shape
+    n_columns = math.ceil(len(cells) ** 0.5)
+    n_rows = math.ceil(len(cells) / n_columns)
+    page = np.full((n_rows * height, n_columns * width, 3), PAPER, np.uint8)
+    for i, cell in enumerate(cells):
+        row, column = divmod(i, n_columns)
+        page[row * height : (row + 1) * height, column * width : (column + 1) * width] = cell
+    return save_png(Image.fromarray(page), path)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,155 @@
+"""`Follower`: takes the steps of a construction again on another mesh, where ids and positions may differ.
+
+Steps name vertices and faces of the mesh that they were recorded on, the old one. A follower knows which of the new
+mesh's each of them is. Where a vertex in the middle of a boundary is missing, the edges beside it are one edge.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from autopoly_env.actions import Action
+from autopoly_env.arrays import FloatArray
+from autopoly_env.edits import Choice
+from autopoly_env.errors import MeshError, SequenceError
+from autopoly_env.mesh import PolyMesh
+from autopoly_env.operators import OPERATORS
+from autopoly_env.sequence_file import Step
+from autopoly_env.sequence_ids import choice_indices, element_index
+
+_ALIKE = 0.5  # share of the corners of two faces, of old and new, that they need to have in common to be one
+
+Place = Callable[[FloatArray], FloatArray]  # where points (P, 2) of an old mesh go
+Taken = tuple[Action, Choice | None, PolyMesh]
+
+
+class Follower:
+    """Where a construction stands that is taken again: the new mesh, and the old names of what is in it."""
+
+    def __init__(self, old: PolyMesh, mesh: PolyMesh, *, is_mirrored: bool = False) -> None:
+        """`mesh` has the vertices of `old` under the same ids; with `is_mirrored` its faces are wound the other way."""
+        self.mesh = mesh
+        self._is_mirrored = is_mirrored
+        self._vertices = {name: name for name in old.vertex_ids if name in set(mesh.vertex_ids)}
+        self._faces = self._match_faces(old)
+
+    def take(self, step: Step, before: PolyMesh, after: PolyMesh, place: Place, *, is_moving: bool = True) -> Taken:
+        """Take a step that once led from `before` to `after`; every vertex goes where `place` takes its old position.
+
+        Vertices without an old position stay; all do, where it is not `is_moving`. Raises an AutoPolyError, and takes
+        nothing, where the step is illegal.
+        """
+        operator = OPERATORS[step.operator]
+        element = element_index(self.mesh, operator.element, self._element(step, before))
+        choice = choice_indices(self.mesh, operator, element, self._choice(step, place))
+        made = operator.apply(self.mesh, element, choice)
+        created = [name for name in made.vertex_ids if name >= self.mesh.next_vertex_id]
+        olds = step.created["vertices"]
+        self._vertices.update(zip(olds, reversed(created) if self._is_mirrored else created, strict=True))
+        self.mesh = self._placed(made, after, place) if is_moving else made
+        self._faces = self._match_faces(after)
+        return Action(step.operator, element), choice, self.mesh
+
+    def do(self, step: Step) -> Taken:
+        """Take a step that names what is in the new mesh, and move what it moves. Raises an AutoPolyError."""
+        if step.operator not in OPERATORS:
+            raise SequenceError(f"operator {step.operator!r} is unknown; give one of {', '.join(OPERATORS)}")
+        operator = OPERATORS[step.operator]
+        element = element_index(self.mesh, operator.element, step.element)
+        choice = choice_indices(self.mesh, operator, element, step.choice)
+        self.mesh = moved_to(operator.apply(self.mesh, element, choice), {name: (x, y) for name, x, y in step.moved})
+        return Action(step.operator, element), choice, self.mesh
+
+    def settle(self, mesh: PolyMesh) -> None:
+        """Go on from other positions of the same vertices."""
+        self.mesh = mesh
+
+    def _element(self, step: Step, before: PolyMesh) -> dict[str, int | list[int]]:
+        named: dict[str, int | list[int]] = {}
+        for key, value in step.element.items():
+            match key, value:
+                case "edge", [a, b]:
+                    named[key] = [self._end(before, a, b), self._end(before, b, a)]
+                case "vertex", int(name):
+                    named[key] = self._vertex(name)
+                case "face", int(name):
+                    named[key] = self._face(name)
+                case _:
+                    named[key] = value
+        return named
+
+    def _end(self, before: PolyMesh, end: int, other: int) -> int:
+        """The new name of an edge's end; past vertices that are missing, the next along the boundary."""
+        if end in self._vertices:
+            return self._vertices[end]
+        v, u = before.vertex_index(end), before.vertex_index(other)
+        for loop in before.topology.boundary_loops:
+            ring = list(loop)
+            if v in ring and u in ring:
+                i, n = ring.index(v), len(ring)
+                for turn in (1, -1):
+                    if ring[(i - turn) % n] == u:
+                        names = (before.vertex_ids[ring[(i + turn * k) % n]] for k in range(1, n))
+                        return next((self._vertices[name] for name in names if name in self._vertices), end)
+        return self._vertex(end)
+
+    def _vertex(self, name: int) -> int:
+        if name not in self._vertices:
+            raise SequenceError(f"vertex {name} is not there any more; drop this step, too")
+        return self._vertices[name]
+
+    def _face(self, name: int) -> int:
+        if name not in self._faces:
+            raise SequenceError(f"face {name} is not there any more; drop this step, too")
+        return self._faces[name]
+
+    def _choice(self, step: Step, place: Place) -> dict[str, Any] | None:
+        match step.choice:
+            case {"to": int(name)}:
+                return {"to": self._vertex(name)}
+            case {"points": points, "bridges": bridges}:
+                placed = place(np.array(points, np.float64)).tolist()
+                names = [(self._vertex(name), int(corner)) for name, corner in bridges]
+                if self._is_mirrored:
+                    placed = placed[::-1]
+                    names = [(name, len(placed) - 1 - corner) for name, corner in names]
+                return {"points": placed, "bridges": names}
+        return step.choice
+
+    def _placed(self, made: PolyMesh, after: PolyMesh, place: Place) -> PolyMesh:
+        present = set(made.vertex_ids)
+        places = zip(after.vertex_ids, place(after.vertices).tolist(), strict=True)
+        named = {self._vertices.get(name, -1): (x, y) for name, (x, y) in places}
+        return moved_to(made, {name: position for name, position in named.items() if name in present})
+
+    def _match_faces(self, old: PolyMesh) -> dict[int, int]:
+        """Of each old face the new one with most of its vertices."""
+        new = [
+            (name, {self.mesh.vertex_ids[v] for v in face})
+            for name, face in zip(self.mesh.face_ids, self.mesh.faces, strict=True)
+        ]
+        matches = {}
+        for name, face in zip(old.face_ids, old.faces, strict=True):
+            corners = {self._vertices.get(old.vertex_ids[v], -1) for v in face} - {-1}
+            alike = [len(corners & others) / len(corners | others) for _, others in new]
+            if max(alike) > _ALIKE:
+                matches[name] = new[alike.index(max(alike))][0]
+        return matches
+
+
+def moved_to(mesh: PolyMesh, positions: dict[int, tuple[float, float]]) -> PolyMesh:
+    """The mesh with some vertices elsewhere, by their ids. Raises MeshError for an unknown id, and for NaN."""
+    vertices = mesh.vertices.copy()
+    for name, place in positions.items():
+        if not np.isfinite(place).all():
+            raise MeshError(f"vertex {name} is moved to {place}; give finite numbers")
+        vertices[mesh.vertex_index(name)] = place
+    return mesh.with_vertices(vertices)
+
+
+def mirror_image(mesh: PolyMesh) -> PolyMesh:
+    """The mesh mirrored at x = 1/2, its faces wound the other way so that their areas stay positive."""
+    topology = type(mesh.topology)(mesh.topology.n_vertices, tuple(face[::-1] for face in mesh.faces))
+    return replace(mesh, vertices=mesh.vertices * (-1.0, 1.0) + (1.0, 0.0), topology=topology)
