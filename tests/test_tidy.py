@@ -1,6 +1,7 @@
 """Constructions told without detours, and shapes without what they do not need; the answers are known beforehand."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -27,7 +28,7 @@ Places = Mapping[int, tuple[float, float]]
 
 def scored(mesh: PolyMesh) -> Score:
     """A score that says which mesh it is of."""
-    return Score(0.25, mesh.complexity, 0, float(mesh.vertices.sum()))
+    return Score(float(SCORE["iou"]), mesh.complexity, 0, float(mesh.vertices.sum()))
 
 
 def told(*steps: tuple[str, dict[str, Any], Places]) -> ConstructionSequence:
@@ -68,7 +69,7 @@ def test_tidy__drops_a_vertex_that_comes_and_goes() -> None:
 
 def test_tidy__renames_what_comes_after_a_dropped_vertex() -> None:
     sequence = told(
-        (SUBDIVIDE, {"edge": [0, 1]}, {4: (0.5, 0.15)}),
+        (SUBDIVIDE, {"edge": [0, 1]}, {4: (0.5, 0.1)}),
         (SUBDIVIDE, {"edge": [2, 3]}, {5: (0.5, 0.9)}),
         (DISSOLVE, {"vertex": 4}, {}),
         (SUBDIVIDE, {"edge": [3, 5]}, {6: (0.4, 0.95)}),
@@ -78,6 +79,20 @@ def test_tidy__renames_what_comes_after_a_dropped_vertex() -> None:
     assert outline(shorter.final()) == outline(sequence.final())
     assert shorter.steps[0].score == scored(shorter.meshes()[1]).as_dict()
     assert shorter.steps[-1].score == sequence.steps[-1].score
+
+
+def test_tidy__keeps_a_detour_that_the_meshes_on_the_way_need() -> None:
+    sequence = told(
+        (SUBDIVIDE, {"edge": [0, 1]}, {4: (0.5, 0.1)}),
+        (SUBDIVIDE, {"edge": [2, 3]}, {5: (0.5, 0.9)}),
+        (DISSOLVE, {"vertex": 4}, {}),
+        (SUBDIVIDE, {"edge": [3, 5]}, {6: (0.4, 0.95)}),
+    )
+
+    def poor(mesh: PolyMesh) -> Score:
+        return replace(scored(mesh), iou=float(SCORE["iou"]) - 0.2)
+
+    assert tidy(sequence, poor) == sequence
 
 
 def test_tidy__works_on_the_whole_edge_where_its_half_was_split() -> None:
