@@ -13,7 +13,6 @@ import numpy as np
 
 from agents.base import Budget, Meter, Progress, Solution, finish
 from agents.trace.rings import signed_area, trace_rings
-from agents.trace.simplify import Contour
 from agents.versions import Version, first_settled, neighbours, total_of, version_of
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import AutoPolyError, SequenceError
@@ -161,7 +160,7 @@ def _on_contours(mesh: PolyMesh, simulator: Simulator) -> PolyMesh:
             continue
         ring = min(alike, key=lambda r: float(((r.points.mean(axis=0) - points.mean(axis=0)) ** 2).sum()))
         rings = [one for one in rings if one is not ring]
-        polygon = Contour(ring.points).polygon(len(points))
+        polygon = ring.contour.polygon(len(points))
         turns = [np.roll(polygon, turn, axis=0) for turn in range(len(polygon))]
         vertices[loop] = min(turns, key=lambda turned: float(((turned - points) ** 2).sum()))
     return mesh.with_vertices(vertices)

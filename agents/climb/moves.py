@@ -8,7 +8,6 @@ import shapely
 
 from agents.trace.outline import Outline, outline_of
 from agents.trace.rings import Ring, signed_area
-from agents.trace.simplify import Contour
 from autopoly_env.actions import Action
 from autopoly_env.arrays import FloatArray
 from autopoly_env.placement import Disagreement, hole_shapes, starts
@@ -119,8 +118,7 @@ def _one_ring_more(outline: Outline, contours: Sequence[Ring]) -> Iterator[Outli
     """One more of the traced contours, at a few sizes: a hole where none is yet, a part outside all parts."""
     polygons = [shapely.Polygon(ring.points) for ring in outline.rings]
     for contour in contours:
-        middle = shapely.Polygon(contour.points).representative_point()
-        inside = [k for k, polygon in enumerate(polygons) if polygon.contains(middle)]
+        inside = [k for k, polygon in enumerate(polygons) if polygon.contains(contour.inner_point)]
         parents = [k for k in inside if not outline.rings[k].is_hole]
         if contour.is_hole and (not parents or len(inside) > len(parents)):
             continue
@@ -128,7 +126,7 @@ def _one_ring_more(outline: Outline, contours: Sequence[Ring]) -> Iterator[Outli
             continue
         for size in _NEW_RING_SIZES:
             if size < len(contour.points):
-                polygon = Contour(contour.points).polygon(size)
+                polygon = contour.contour.polygon(size)
                 ring = Ring(polygon, parents[-1] if contour.is_hole else -1)
                 yield outline_of([*outline.rings, ring], outline.rings)
 

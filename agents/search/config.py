@@ -26,7 +26,7 @@ class MctsConfig:
     reuse_tree: bool = True  # keep what is below the child that is taken
     merge: bool = True  # do not go on from a shape that the tree has already
     patience: int = 4  # committed steps in a row that may fail to improve the best shape
-    hop_patience: int = 20  # hops in a row, from outline to outline, that may; 0: the search ends with the tree
+    hop_patience: int = 60  # hops in a row, from outline to outline, that may; 0: the search ends with the tree
     n_refits: int = 1500  # where the budget sets no limit
     seed: int = 0
 

@@ -76,7 +76,7 @@ class TraceAgent(WholeAgent):
         if not rings:
             return
         reach = Reach.of(simulator)
-        contours = [Contour(ring.points) for ring in rings]
+        contours = [ring.contour for ring in rings]
         area = float(simulator.silhouette.mask.mean())
         prices = self._config.prices
         seen: set[tuple[int, ...]] = set()
@@ -104,7 +104,8 @@ def choose_sizes(
     kept: set[int] = set()
     for k, (ring, contour) in enumerate(zip(rings, contours, strict=True)):
         errors = contour.errors
-        sizes = [n for n in reach.sizes(ring, k) if n < len(errors)] if k == 0 or ring.parent in kept | {-1} else []
+        allowed = reach.sizes(ring, k) if k == 0 or ring.parent in kept | {-1} else range(0)
+        sizes = range(allowed.start, min(allowed.stop, len(errors)))
         extra = 3 if ring.is_hole else 1  # edges and faces beyond one edge a vertex
         costs = [weights.w_sm * errors[n] / area + weights.w_sc * (2 * n + extra) for n in sizes]
         worth_it = k == 0 or (sizes and min(costs) < weights.w_sm * abs(signed_area(ring.points)) / area)

@@ -1,11 +1,13 @@
 """Closed contours of a silhouette: outer rings and holes, in the unit square."""
 
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 import shapely
 from skimage.measure import find_contours
 
+from agents.trace.simplify import Contour
 from autopoly_env.arrays import FloatArray
 from autopoly_env.silhouette import Silhouette
 
@@ -24,6 +26,16 @@ class Ring:
     def is_hole(self) -> bool:
         return self.parent >= 0
 
+    @cached_property
+    def contour(self) -> Contour:
+        """The ring as something to make polygons of."""
+        return Contour(self.points)
+
+    @cached_property
+    def inner_point(self) -> shapely.Point:
+        """Some point inside."""
+        return shapely.Polygon(self.points).representative_point()
+
 
 def signed_area(points: FloatArray) -> float:
     """Shoelace area of a closed polygon (n, 2), positive as faces are wound."""
@@ -32,13 +44,18 @@ def signed_area(points: FloatArray) -> float:
 
 
 def trace_rings(silhouette: Silhouette) -> list[Ring]:
-    """All contours at half coverage: outer rings first, the largest first, then the holes."""
+    """All contours at half coverage: outer rings first, the largest first, then the holes. Asked again, the same."""
+    return list(_traced(silhouette))
+
+
+@lru_cache(maxsize=32)
+def _traced(silhouette: Silhouette) -> tuple[Ring, ...]:
     size = min(silhouette.resolution, TRACE_RESOLUTION)
     padded = np.pad(silhouette.target(size).coverage, 1)
     loops = [(line[:-1, ::-1] - 0.5) / size for line in find_contours(padded, _LEVEL)]
     loops = [loop for loop in loops if len(loop) >= 3 and abs(signed_area(loop)) > 0.0]
     if not loops:
-        return []
+        return ()
     largest = max(loops, key=lambda loop: abs(signed_area(loop)))
     outward = 1.0 if signed_area(largest) > 0.0 else -1.0  # the largest contour is an outer one
     oriented = [loop if outward > 0.0 else loop[::-1] for loop in loops]
@@ -49,4 +66,4 @@ def trace_rings(silhouette: Silhouette) -> list[Ring]:
         inside = np.flatnonzero(shapely.contains_xy(polygons, *hole[0]))
         if len(inside):
             rings.append(Ring(hole, int(inside[-1])))  # the smallest one around it
-    return rings
+    return tuple(rings)
