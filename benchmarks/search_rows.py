@@ -40,7 +40,7 @@ VARIANTS: dict[str, tuple[Any, ...]] = {
     "reuse_tree": (True, False),
     "merge": (True, False),
     "seeds": ((), ("trace",), ("climb",), ("climb", "decimate")),
-    "hop_patience": (0, 20, 1000),
+    "hop_patience": (0, 60, 1000),
 }
 
 Complete = Callable[[Iterable[Case]], Results]  # gets results for cases; those that failed are left out
