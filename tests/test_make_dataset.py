@@ -169,7 +169,7 @@ def test_killed_run__leaves_only_whole_shards_and_goes_on(run: Run, tmp_path: Pa
     ]
     process = subprocess.Popen([sys.executable, "-m", "training.make_dataset", *arguments], cwd=ROOT)
     deadline = time.monotonic() + 60
-    while not Path("data/shard-00000.npz").exists() and time.monotonic() < deadline:
+    while not Path("data/shard-00001.npz").exists() and time.monotonic() < deadline:
         time.sleep(0.01)
     process.kill()
     assert process.wait() == -signal.SIGKILL
