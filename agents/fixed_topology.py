@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from agents.base import Meter, Solution, WholeAgent, finish
+from agents.extras import require
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.refit import FROM_AFAR, RefitTarget, refit
@@ -68,13 +69,7 @@ class DescentAgent(WholeAgent):
     """Gradient descent from a grid of n x n quads, counted as one refit; its result is not polished afterwards."""
 
     def __init__(self, name: str, config: DrSimpleConfig, n: int, allow_defects: bool) -> None:
-        try:
-            import agents.descent  # noqa: F401
-        except ImportError as error:
-            raise ConfigError(
-                f"agent {name!r} with refit=gradient needs the package {error.name}, which is not installed: "
-                "pip install -e '.[learn]' in the checkout"
-            ) from None
+        require("learn", f"agent {name!r} with refit=gradient", "torch")
         self.name = name
         self._config, self._n, self._allow_defects = config, n, allow_defects
 

@@ -1,10 +1,7 @@
 """Agents by name: `make_agent("beam", width=4)`."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
-
-from pydantic import TypeAdapter, ValidationError
 
 from agents.base import Agent
 from agents.beam import BeamAgent, BeamConfig
@@ -13,6 +10,7 @@ from agents.decimate import DecimateAgent, DecimateConfig
 from agents.fixed_topology import DrComplexConfig, DrSimpleConfig, dr_complex, dr_simple
 from agents.guided.agent import nfap_mcts, nfap_prior
 from agents.guided.config import NfapMctsConfig, NfapPriorConfig
+from agents.options import validated
 from agents.oracle import OracleAgent, OracleConfig
 from agents.random_agent import RandomAgent, RandomConfig
 from agents.search.config import PAPER, MctsConfig
@@ -63,11 +61,5 @@ def make_agent(name: str, /, **options: Any) -> Agent:
     if unknown:
         known = ", ".join(default.__dataclass_fields__)
         raise ConfigError(f"agent {name!r} has no option {unknown[0]!r}; its options are {known}")
-    values = {field: getattr(replace(default), field) for field in default.__dataclass_fields__} | options
-    try:
-        config = TypeAdapter(type(default)).validate_python(values)
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        raise ConfigError(f"agent {name!r}, option {where}: {first['msg']}, got {first['input']!r}") from None
-    return make(config)
+    values = {field: getattr(default, field) for field in default.__dataclass_fields__} | options
+    return make(validated(type(default), values, f"agent {name!r}, option "))

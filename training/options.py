@@ -3,12 +3,11 @@
 import json
 import os
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any, TypeVar
 
 import yaml
-from pydantic import TypeAdapter, ValidationError
 
+from agents.options import read_yaml, validated
 from autopoly_env.errors import ConfigError
 
 _Config = TypeVar("_Config")
@@ -22,7 +21,7 @@ def read_config(path: str | os.PathLike[str] | None, overrides: list[str], defau
     """
     values = asdict(default)  # type: ignore[call-overload]
     if path is not None:
-        _merge(values, _read(path), str(path))
+        _merge(values, read_yaml(path), str(path))
     for override in overrides:
         key, equals, text = override.partition("=")
         if not (key and equals):
@@ -37,11 +36,7 @@ def read_config(path: str | os.PathLike[str] | None, overrides: list[str], defau
 def build_config(kind: type[_Config], values: dict[str, Any], where: str) -> _Config:
     """A config of a dataclass from plain values. Raises ConfigError, with `where` they are from."""
     try:
-        return TypeAdapter(kind).validate_python(values)
-    except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(map(str, first["loc"]))
-        raise ConfigError(f"{where}: {key}: {first['msg']}, got {first['input']!r}") from None
+        return validated(kind, values)
     except ConfigError as error:
         raise ConfigError(f"{where}: {error}") from None
 
@@ -70,16 +65,3 @@ def _value(override: str, text: str) -> Any:
         return yaml.safe_load(text)
     except (yaml.YAMLError, ValueError, RecursionError):
         raise ConfigError(f"override {override!r}: the value is not YAML; quote it or correct it") from None
-
-
-def _read(path: str | os.PathLike[str]) -> dict[Any, Any]:
-    try:
-        options = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
-        raise ConfigError(f"cannot read {path} ({reason}); give a YAML file of options") from None
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise ConfigError(f"{path}: not YAML ({' '.join(str(error).split())}); write 'option: value' lines") from None
-    if options is not None and not isinstance(options, dict):
-        raise ConfigError(f"{path}: holds a {type(options).__name__}; write one 'option: value' a line")
-    return options or {}

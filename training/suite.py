@@ -13,6 +13,7 @@ import yaml
 from pydantic import ConfigDict, Field
 
 from agents.base import Agent, Budget
+from agents.options import read_yaml
 from agents.registry import AGENTS, make_agent
 from autopoly_env.errors import AutoPolyError, ConfigError
 from autopoly_env.score import ScoreWeights
@@ -162,7 +163,7 @@ def find_suite(given: str, overrides: Sequence[str] = ()) -> Suite:
         elif path.suffix not in (".yaml", ".yml"):
             known = ", ".join(sorted(path.stem for path in FOLDER.glob("*.yaml")))
             raise ConfigError(f"suite {given!r} is unknown; give one of {known}, a YAML file, or a folder of images")
-    values = {"name": path.stem, **_read(path)}
+    values = {"name": path.stem, **read_yaml(path, "a suite", may_be_empty=False)}
     for override in extra:
         _apply(values, override)
     return build_config(Suite, values, str(path) if path.parent != FOLDER else f"suite {path.stem}")
@@ -198,20 +199,6 @@ def chosen(suite: Suite, names: Sequence[str]) -> tuple[Suite, set[str]]:
             raise ConfigError(f"agent {name!r} is unknown; give some of {', '.join(known)}")
         labels |= meant
     return suite, labels
-
-
-def _read(path: Path) -> dict[Any, Any]:
-    """The mapping in a YAML file."""
-    try:
-        values = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
-        raise ConfigError(f"cannot read {path} ({reason}); give the YAML file of a suite") from None
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise ConfigError(f"{path}: not YAML ({' '.join(str(error).split())}); write 'key: value' lines") from None
-    if not isinstance(values, dict):
-        raise ConfigError(f"{path}: holds a {type(values).__name__}; write 'key: value' lines, see configs/suite")
-    return values
 
 
 def _apply(values: dict[Any, Any], override: str) -> None:

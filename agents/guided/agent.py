@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from agents.base import Agent, Decision, Meter, Track
+from agents.extras import require
 from agents.guided.config import NfapMctsConfig, NfapPriorConfig
 from agents.search.mcts import MctsAgent
 from autopoly_env.actions import STOP
@@ -92,12 +93,9 @@ def nfap_mcts(config: NfapMctsConfig) -> Agent:
 
 def _require_torch(name: str) -> None:
     """Raise ConfigError where the packages that the networks need are missing; keep torch to this process's threads."""
-    try:
-        import safetensors  # noqa: F401
-        import torch
-    except ImportError as error:
-        missing = f"agent {name!r} needs the package {error.name}, which is not installed"
-        raise ConfigError(f"{missing}: pip install -e '.[learn]' in the checkout") from None
+    require("learn", f"agent {name!r}", "safetensors", "torch")
+    import torch
+
     torch.set_num_threads(n_threads())
 
 
