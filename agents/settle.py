@@ -19,7 +19,7 @@ from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import OPERATORS
 from autopoly_env.placement import is_sane
 from autopoly_env.sequence import ConstructionSequence
-from autopoly_env.sequence_ids import choice_indices, element_index
+from autopoly_env.sequence_ids import decoded
 from autopoly_env.simulator import Simulator
 
 _MOST_ROUNDS = 4
@@ -64,9 +64,8 @@ class _Film:
         self.meshes = sequence.meshes()
         self.taken: list[tuple[Action, Choice | None]] = []
         for step, mesh in zip(sequence.steps, self.meshes, strict=False):
-            operator = OPERATORS[step.operator]
-            element = element_index(mesh, operator.element, step.element)
-            self.taken.append((Action(step.operator, element), choice_indices(mesh, operator, element, step.choice)))
+            _, element, choice = decoded(mesh, step)
+            self.taken.append((Action(step.operator, element), choice))
         self._worth = [self._worth_of(mesh) for mesh in self.meshes]
 
     def movers(self, time: int) -> list[int]:

@@ -17,7 +17,7 @@ from autopoly_env.errors import MeshError, SequenceError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import OPERATORS
 from autopoly_env.sequence_file import Step
-from autopoly_env.sequence_ids import choice_indices, element_index
+from autopoly_env.sequence_ids import choice_indices, decoded, element_index
 
 _ALIKE = 0.5  # share of the corners of two faces, of old and new, that they need to have in common to be one
 
@@ -54,11 +54,7 @@ class Follower:
 
     def do(self, step: Step) -> Taken:
         """Take a step that names what is in the new mesh, and move what it moves. Raises an AutoPolyError."""
-        if step.operator not in OPERATORS:
-            raise SequenceError(f"operator {step.operator!r} is unknown; give one of {', '.join(OPERATORS)}")
-        operator = OPERATORS[step.operator]
-        element = element_index(self.mesh, operator.element, step.element)
-        choice = choice_indices(self.mesh, operator, element, step.choice)
+        operator, element, choice = decoded(self.mesh, step)
         self.mesh = moved_to(operator.apply(self.mesh, element, choice), {name: (x, y) for name, x, y in step.moved})
         return Action(step.operator, element), choice, self.mesh
 

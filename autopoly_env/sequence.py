@@ -13,9 +13,9 @@ import numpy as np
 from autopoly_env.actions import STOP, Action
 from autopoly_env.errors import AutoPolyError, OutputError, SequenceError
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import OPERATORS, Choice, Operator
+from autopoly_env.operators import Choice
 from autopoly_env.sequence_file import Score, Step, check_score, dump_json, parse_json, plain_json
-from autopoly_env.sequence_ids import choice_ids, choice_indices, element_ids, element_index, element_words
+from autopoly_env.sequence_ids import choice_ids, decoded, element_ids, element_words, operator_named
 
 __all__ = ["ConstructionSequence", "Step"]
 
@@ -175,7 +175,7 @@ class ConstructionSequence:
 
 
 def _record_step(mesh: PolyMesh, action: Action, choice: Choice | None, after: PolyMesh, score: Score) -> Step:
-    operator, element = _operator(action.operator), int(action.element)
+    operator, element = operator_named(action.operator), int(action.element)
     if choice is None:
         choice = operator.choose(mesh, element)
     made = operator.apply(mesh, element, choice)
@@ -197,9 +197,8 @@ def _record_step(mesh: PolyMesh, action: Action, choice: Choice | None, after: P
 
 
 def _replay_step(mesh: PolyMesh, step: Step) -> PolyMesh:
-    operator = _operator(step.operator)
-    element = element_index(mesh, operator.element, step.element)
-    made = operator.apply(mesh, element, choice_indices(mesh, operator, element, step.choice))
+    operator, element, choice = decoded(mesh, step)
+    made = operator.apply(mesh, element, choice)
     for what, expected, found in zip(
         ("creates", "removes"), _id_changes(mesh, made), (step.created, step.removed), strict=True
     ):
@@ -213,12 +212,6 @@ def _replay_step(mesh: PolyMesh, step: Step) -> PolyMesh:
     for name, x, y in step.moved:
         vertices[made.vertex_index(name)] = x, y
     return made.with_vertices(vertices)
-
-
-def _operator(name: str) -> Operator:
-    if name not in OPERATORS:
-        raise SequenceError(f"operator {name!r} is unknown; give one of {', '.join(OPERATORS)}")
-    return OPERATORS[name]
 
 
 def _id_changes(before: PolyMesh, after: PolyMesh) -> tuple[dict[str, list[int]], dict[str, list[int]]]:

@@ -6,7 +6,7 @@ from autopoly_env.edits import HOLE_SIDES
 from autopoly_env.errors import SequenceError
 from autopoly_env.holes import HoleChoice
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import Choice, Operator
+from autopoly_env.operators import OPERATORS, Choice, Operator
 from autopoly_env.sequence_file import Step, parse_hole, parse_id
 
 
@@ -80,6 +80,23 @@ def choice_indices(mesh: PolyMesh, operator: Operator, element: int, choice: dic
     if choice is None and operator.name not in ("face_split", "face_hole"):
         return None
     raise SequenceError(f"choice {choice} is not one of {operator.name}; see docs/sequence-format.md")
+
+
+def decoded(mesh: PolyMesh, step: Step) -> tuple[Operator, int, Choice | None]:
+    """The operator of a step from `mesh`, and the indices there of its element and its choice.
+
+    Raises SequenceError or MeshError for what there is not.
+    """
+    operator = operator_named(step.operator)
+    element = element_index(mesh, operator.element, step.element)
+    return operator, element, choice_indices(mesh, operator, element, step.choice)
+
+
+def operator_named(name: str) -> Operator:
+    """The operator of that name. Raises SequenceError if there is none."""
+    if name not in OPERATORS:
+        raise SequenceError(f"operator {name!r} is unknown; give one of {', '.join(OPERATORS)}")
+    return OPERATORS[name]
 
 
 def element_words(step: Step) -> str:

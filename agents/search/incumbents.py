@@ -5,9 +5,8 @@ from dataclasses import replace
 
 from agents.base import Agent, Meter, Progress, Solution, Track
 from autopoly_env.actions import Action
-from autopoly_env.operators import OPERATORS
 from autopoly_env.sequence import ConstructionSequence
-from autopoly_env.sequence_ids import choice_indices, element_index
+from autopoly_env.sequence_ids import decoded
 from autopoly_env.simulator import Simulator
 
 SHARE = 0.6  # of what is left of the budget, that an incumbent may use
@@ -49,9 +48,7 @@ def track_of(simulator: Simulator, sequence: ConstructionSequence) -> Track:
     meshes = sequence.meshes()
     track = Track(simulator.initial(sequence.start))
     for number, (step, before, after) in enumerate(zip(sequence.steps, meshes, meshes[1:], strict=False), 1):
-        operator = OPERATORS[step.operator]
-        element = element_index(before, operator.element, step.element)
-        choice = choice_indices(before, operator, element, step.choice)
+        _, element, choice = decoded(before, step)
         state = simulator.initial(after)
         over = state.done or ("max_steps" if number >= simulator.max_steps else "")
         track = Track(

@@ -24,10 +24,9 @@ from autopoly_env.export.replay import finite_meshes, unmoved
 from autopoly_env.export.words import Words, describe_start, describe_step
 from autopoly_env.files import write_atomically
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import OPERATORS
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence_file import Score, Step
-from autopoly_env.sequence_ids import choice_indices, element_index
+from autopoly_env.sequence_ids import decoded
 from autopoly_env.silhouette import Silhouette
 
 DIGITS = 5  # of a coordinate: a hundredth of a pixel on a screen
@@ -127,9 +126,8 @@ def _pose(mesh: PolyMesh, score: Score, words: Words) -> dict[str, Any]:
 
 def _motion(before: PolyMesh, step: Step, after: PolyMesh) -> dict[str, Any]:
     """How the vertices came there: where new ones grow from, where the operator puts them, where lost ones go."""
-    operator = OPERATORS[step.operator]
-    element = element_index(before, operator.element, step.element)
-    made = operator.apply(before, element, choice_indices(before, operator, element, step.choice))
+    operator, element, choice = decoded(before, step)
+    made = operator.apply(before, element, choice)
     new = [made.vertex_index(name) for name in step.created["vertices"]]
     sources = _sources(before, step, made, new)
     put = {
