@@ -35,23 +35,22 @@ def tidy(sequence: ConstructionSequence, scored: Callable[[PolyMesh], Score]) ->
     The last mesh is the same but for its ids: the same vertices, bit for bit, in the same faces. `scored` scores the
     meshes on the way that are new; the last keeps its score.
     """
-    j = 0
+    meshes, j = sequence.meshes(), 0
     while j < len(sequence.steps):
-        for detour in _detours(sequence, j):
-            shorter = _without(sequence, detour, scored)
+        for detour in _detours(sequence, meshes, j):
+            shorter = _without(sequence, meshes, detour, scored)
             if shorter is not None:
-                sequence, j = shorter, j - len(detour)
+                sequence, meshes, j = shorter, shorter.meshes(), j - len(detour)
                 break
         j += 1
     return sequence
 
 
-def _detours(sequence: ConstructionSequence, j: int) -> Iterator[frozenset[int]]:
+def _detours(sequence: ConstructionSequence, meshes: Sequence[PolyMesh], j: int) -> Iterator[frozenset[int]]:
     """Sets of steps, from 0, that may undo each other: step j, if it removes, and those that made what it removes."""
     step = sequence.steps[j]
     if step.operator not in REMOVING:
         return
-    meshes = sequence.meshes()
     match step.element:
         case {"edge": [a, b]}:
             makers = [i for i in range(j) if _has_edge(meshes[i + 1], a, b) and not _has_edge(meshes[i], a, b)][-1:]
@@ -75,10 +74,13 @@ def _has_edge(mesh: PolyMesh, a: int, b: int) -> bool:
 
 
 def _without(
-    sequence: ConstructionSequence, detour: frozenset[int], scored: Callable[[PolyMesh], Score]
+    sequence: ConstructionSequence,
+    meshes: Sequence[PolyMesh],
+    detour: frozenset[int],
+    scored: Callable[[PolyMesh], Score],
 ) -> ConstructionSequence | None:
     """The sequence without the steps of a detour; None if they are needed."""
-    meshes, steps = sequence.meshes(), sequence.steps
+    steps = sequence.steps
     kept = [k for k in range(len(steps)) if k not in detour]
     first = min(min(detour), max(kept, default=0))  # so that some step is told again, unless none is left
     kept = [k for k in kept if k >= first]

@@ -96,6 +96,7 @@ class Simulator:
         self.max_steps = max_steps
         self.match_threshold = match_threshold
         self._target = self.silhouette.target(resolution)
+        self.finest = min(self.silhouette.resolution, POLISH_RESOLUTION)  # pixels a side at which meshes are finished
         self._refit_targets: dict[tuple[int, float], RefitTarget] = {}
 
     def refit_target(self, iou: float, resolution: int | None = None) -> RefitTarget:
@@ -290,10 +291,10 @@ class Simulator:
 
     def refine(self, mesh: PolyMesh) -> PolyMesh:
         """The mesh refitted at the silhouette's own resolution (at most `POLISH_RESOLUTION`), as long as that helps."""
-        size = min(self.silhouette.resolution, POLISH_RESOLUTION)
+        bonds = self.guidance.bonds(mesh)
         best, score = mesh, self.final_score(mesh)
         for _ in range(_N_REFINED):
-            fitted = refit(best, self.refit_target(score.iou, size), LOCAL, self.guidance.bonds(mesh)).mesh
+            fitted = refit(best, self.refit_target(score.iou, self.finest), LOCAL, bonds).mesh
             fitted_score = self.final_score(fitted)
             if not fitted_score.total > score.total:
                 break
@@ -303,8 +304,7 @@ class Simulator:
     def polish(self, mesh: PolyMesh) -> PolyMesh:
         """The mesh refined, then tuned at the same resolution: no worse than it was."""
         refined = self.refine(mesh)
-        size = min(self.silhouette.resolution, POLISH_RESOLUTION)
-        tuned = tune(refined, self.silhouette.target(size), self.guidance.bonds(mesh))
+        tuned = tune(refined, self.silhouette.target(self.finest), self.guidance.bonds(mesh))
         return max((refined, tuned), key=lambda candidate: self.final_score(candidate).total)
 
 

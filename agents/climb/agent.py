@@ -6,6 +6,7 @@ Of two meshes with the same outline the score prefers the one with fewer inner e
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 
 from agents.base import Meter, Solution, WholeAgent, finish
 from agents.beam import BeamAgent, BeamConfig
@@ -42,19 +43,16 @@ class ClimbAgent(WholeAgent):
         candidates = []
         try:
             for seed in self._traced(tops.hill, meter):
-                tops.add(seed)
-                for place in climb(tops.hill, seed, self._config, meter):
-                    tops.add(place)
+                self._climb(tops, seed, meter)
             if self._config.with_greedy and not meter.spent():
                 solution = BeamAgent(BeamConfig(width=1)).solve(simulator, meter.rest())
                 candidates.append(solution)
                 meter.count(solution.stats.n_refits, solution.score.total)
                 if solution.stats.stopped_by == "interrupted":
                     raise KeyboardInterrupt
-                seed_or_none = tops.add_mesh(solution.mesh)
-                if seed_or_none is not None:
-                    for place in climb(tops.hill, seed_or_none, self._config, meter):
-                        tops.add(place)
+                found = tops.add_mesh(solution.mesh)
+                if found is not None:
+                    self._climb(tops, found, meter)
         except KeyboardInterrupt:
             meter.stopped_by = "interrupted"
         if tops.places():
@@ -64,10 +62,15 @@ class ClimbAgent(WholeAgent):
         best = max(candidates, key=lambda candidate: candidate.score.total)
         return Solution(best.sequence, best.mesh, best.score, meter.stats())
 
+    def _climb(self, tops: Tops, seed: Place, meter: Meter) -> None:
+        """Climb from a seed, and keep what is come by."""
+        for place in chain([seed], climb(tops.hill, seed, self._config, meter)):
+            tops.add(place)
+
     def _traced(self, hill: Hill, meter: Meter) -> Iterator[Place]:
         sizes: set[int] = set()
         places = map(hill.place, list(TraceAgent(TraceConfig()).outlines(hill.simulator, meter)))
-        for place in sorted(places, key=lambda place: -place.total):
+        for place in sorted(places, key=total_of, reverse=True):
             if place.score.complexity not in sizes and len(sizes) < self._config.n_seeds and not meter.spent():
                 sizes.add(place.score.complexity)
                 yield place
@@ -78,16 +81,14 @@ def climb(hill: Hill, place: Place, config: ClimbConfig, meter: Meter) -> Iterat
     for _ in range(config.n_rounds):
         if meter.spent():
             return
-        silhouette, iou, allows = hill.simulator.silhouette, place.score.iou, hill.reach.allows
-        found = neighbours(place.outline, silhouette, hill.contours, config.n_blamed, holes=hill.reach.holes)
-        places = hill.fit(meter.affordable(filter(allows, found)), LOCAL, iou)
+        places = fitted_neighbours(hill, place, config.n_blamed, meter)
         n_fits = len(places)
         best = max(places, key=total_of, default=place)
         if best.total <= place.total + LEAST_GAIN:
             hopeful = sorted(places, key=total_of, reverse=True)[: config.n_thorough]
-            places = hill.fit([*(p.outline for p in hopeful), place.outline], THOROUGH, iou)
-            moved = [o for o in relocations(place.outline, silhouette, config.n_relocated) if allows(o)]
-            places += hill.fit(moved, LOCAL, iou)
+            places = hill.fit([*(p.outline for p in hopeful), place.outline], THOROUGH, place.score.iou)
+            moved = relocations(place.outline, hill.simulator.silhouette, config.n_relocated)
+            places += hill.fit(list(filter(hill.reach.allows, moved)), LOCAL, place.score.iou)
             n_fits += len(places)
             best = max(places, key=total_of)
         if best.total <= place.total + LEAST_GAIN:
@@ -96,3 +97,9 @@ def climb(hill: Hill, place: Place, config: ClimbConfig, meter: Meter) -> Iterat
         place = best
         yield place
         meter.count(n_fits, place.total)
+
+
+def fitted_neighbours(hill: Hill, place: Place, n_blamed: int, meter: Meter) -> list[Place]:
+    """The neighbours of a place that can be built, refitted; as many as refits are left for, and not counted yet."""
+    found = neighbours(place.outline, hill.simulator.silhouette, hill.contours, n_blamed, holes=hill.reach.holes)
+    return hill.fit(meter.affordable(filter(hill.reach.allows, found)), LOCAL, place.score.iou)

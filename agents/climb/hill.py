@@ -9,7 +9,7 @@ from agents.trace.rings import trace_rings
 from autopoly_env.parallel import map_threads
 from autopoly_env.refit import RefitConfig
 from autopoly_env.score import Score
-from autopoly_env.simulator import POLISH_RESOLUTION, Simulator
+from autopoly_env.simulator import Simulator
 
 LEAST_GAIN = 1e-9  # of r_all, below which a place is no better than another
 
@@ -26,14 +26,13 @@ class Place(NamedTuple):
 
 
 class Hill:
-    """The landscape of one target: r_all at the silhouette's own resolution (at most `POLISH_RESOLUTION`)."""
+    """The landscape of one target: r_all at the silhouette's own resolution (`Simulator.finest` at most)."""
 
     def __init__(self, simulator: Simulator) -> None:
         self.simulator = simulator
         self.contours = trace_rings(simulator.silhouette)
         self.reach = Reach.of(simulator)
-        self.finest = min(POLISH_RESOLUTION, simulator.silhouette.resolution)
-        self._pixels = simulator.silhouette.target(self.finest)
+        self._pixels = simulator.silhouette.target(simulator.finest)
 
     def place(self, outline: Outline) -> Place:
         """The outline as it is."""

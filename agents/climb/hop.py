@@ -9,9 +9,9 @@ from itertools import chain
 import numpy as np
 
 from agents.base import Meter
-from agents.climb.agent import ClimbConfig, climb
+from agents.climb.agent import ClimbConfig, climb, fitted_neighbours
 from agents.climb.hill import LEAST_GAIN, Hill, Place, total_of
-from agents.climb.moves import neighbours, shaken
+from agents.climb.moves import shaken
 from agents.climb.variants import variants
 from agents.trace.agent import TraceAgent, TraceConfig
 from agents.trace.rings import trace_rings
@@ -79,8 +79,7 @@ def _hop_from(hill: Hill, top: Place, most_lost: float, rng: np.random.Generator
 def _descend(hill: Hill, place: Place, meter: Meter) -> Place:
     """Move to the best neighbour while one is better, without looking hard."""
     while not meter.spent():
-        found = neighbours(place.outline, hill.simulator.silhouette, hill.contours, _N_BLAMED, holes=hill.reach.holes)
-        places = hill.fit(meter.affordable(filter(hill.reach.allows, found)), LOCAL, place.score.iou)
+        places = fitted_neighbours(hill, place, _N_BLAMED, meter)
         best = max(places, key=total_of, default=place)
         meter.count(len(places), best.total)
         if best.total <= place.total + LEAST_GAIN:

@@ -31,8 +31,8 @@ class MctsConfig:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        least = {"n_simulations": 1, "n_expanded": 1, "patience": 1, "n_rollout": 0, "exploration": 0.0, "seed": 0}
-        least |= {"hop_patience": 0, "n_refits": 0}
+        positive = dict.fromkeys(("n_simulations", "n_expanded", "patience"), 1)
+        least = positive | dict.fromkeys(("n_rollout", "exploration", "seed", "hop_patience", "n_refits"), 0)
         for name, bound in least.items():
             if not getattr(self, name) >= bound:
                 raise ConfigError(f"{name} = {getattr(self, name)}: expected at least {bound}")

@@ -58,8 +58,9 @@ class MctsAgent(Agent):
         on_progress: Callable[[Progress], None] | None = None,
     ) -> Solution:
         """As every agent; never worse than the incumbents. A budget without limits is one of `config.n_refits`."""
-        unlimited = budget is None or budget == Budget()
-        meter = Meter(Budget(self._config.n_refits) if unlimited or budget is None else budget, on_progress)
+        if budget is None or budget == Budget():
+            budget = Budget(self._config.n_refits)
+        meter = Meter(budget, on_progress)
         finds = _Finds(Track(simulator.initial()), Tops(Hill(simulator)) if self._hops(simulator) else None)
         try:
             meter.add([finds.best.state])
