@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from autopoly_env.errors import AutoPolyError, ConfigError, OutputError, SequenceError
+from agents.command import FAILURE, complain, run_command
+from autopoly_env.errors import ConfigError, OutputError, SequenceError
 
 if TYPE_CHECKING:
     from autopoly_env.sequence import ConstructionSequence
-
-FAILURE, USAGE_ERROR, INTERRUPTED = 1, 2, 130
 
 HELP = """Write construction sequences in another format.
 
@@ -84,29 +83,14 @@ def export(
             sequence = _load(source, step)
             print(kind.write(Export(sequence, silhouette, depth), goal))
         except (OutputError, SequenceError) as error:
-            _complain(str(error) if str(source) in str(error) else f"{source}: {error}", FAILURE)
+            complain(str(error) if str(source) in str(error) else f"{source}: {error}", FAILURE)
             n_failed += 1
     return FAILURE if n_failed else 0
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; whatever is wrong is told in one line on stderr. Returns the exit code."""
-    try:
-        code = app(arguments, prog_name="python -m agents.export", standalone_mode=False) or 0
-        return _complain("stopped by Ctrl-C", code) if code == INTERRUPTED else code  # which typer makes of it
-    except ConfigError as error:
-        return _complain(str(error), USAGE_ERROR)
-    except AutoPolyError as error:
-        return _complain(str(error), FAILURE)
-    except Exception as error:
-        if not hasattr(error, "format_message"):  # which typer's own usage errors have
-            raise
-        return _complain(f"{error.format_message()} (see --help)", USAGE_ERROR)
-
-
-def _complain(message: str, exit_code: int) -> int:
-    print("error:", " ".join(message.split()), file=sys.stderr)
-    return exit_code
+    return run_command(app, arguments, "python -m agents.export")
 
 
 def _load(path: Path, step: int | None) -> "ConstructionSequence":

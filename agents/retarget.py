@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from autopoly_env.errors import AutoPolyError, ConfigError, SequenceError
+from agents.command import INTERRUPTED, run_command
+from autopoly_env.errors import ConfigError, SequenceError
 
 if TYPE_CHECKING:
     from agents.retargeting import Retargeted
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     from autopoly_env.silhouette import Silhouette
     from autopoly_env.simulator import Simulator
 
-FAILURE, USAGE_ERROR, INTERRUPTED = 1, 2, 130
 STOPPED = "stopped by Ctrl-C; the files that were written are whole"
 
 HELP = """Tell the steps of a construction again for another silhouette, and mend them where they do not fit.
@@ -87,22 +87,7 @@ def retarget(
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; whatever is wrong is told in one line on stderr. Returns the exit code."""
-    try:
-        code = app(arguments, prog_name="python -m agents.retarget", standalone_mode=False) or 0
-        return _complain(STOPPED, code) if code == INTERRUPTED else code
-    except ConfigError as error:
-        return _complain(str(error), USAGE_ERROR)
-    except AutoPolyError as error:
-        return _complain(str(error), FAILURE)
-    except Exception as error:
-        if not hasattr(error, "format_message"):  # which typer's own usage errors have
-            raise
-        return _complain(f"{error.format_message()} (see --help)", USAGE_ERROR)
-
-
-def _complain(message: str, exit_code: int) -> int:
-    print("error:", " ".join(message.split()), file=sys.stderr)
-    return exit_code
+    return run_command(app, arguments, "python -m agents.retarget", stopped=STOPPED)
 
 
 def _simulator(source: Path, sequence: "ConstructionSequence", silhouette: "Silhouette") -> "Simulator":

@@ -9,10 +9,10 @@ from typing import Annotated, Any
 
 import typer
 
+from agents.command import FAILURE, complain, run_command
 from autopoly_env.errors import AutoPolyError, ConfigError
 
 DEFAULT_AGENT = "mcts"
-USAGE_ERROR, FAILURE = 2, 1
 
 HELP = """Build a polygon mesh of every silhouette and tell how, action by action.
 
@@ -132,25 +132,12 @@ def solve(
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; whatever is wrong is told in one line on stderr. Returns the exit code."""
     try:
-        return app(arguments, prog_name="python -m agents.solve", standalone_mode=False) or 0
-    except ConfigError as error:
-        return _complain(str(error), USAGE_ERROR)
-    except AutoPolyError as error:
-        return _complain(str(error), FAILURE)
+        return run_command(app, arguments, "python -m agents.solve", stopped="")
     except OSError as error:
         if error.errno == errno.EPIPE:
             raise
         sys.stdout = io.StringIO()  # so that leaving does not fail on it again
-        return _complain(f"cannot print the results ({error.strerror}); give them another place to go", FAILURE)
-    except Exception as error:
-        if not hasattr(error, "format_message"):  # which typer's own usage errors have
-            raise
-        return _complain(f"{error.format_message()} (see --help)", USAGE_ERROR)
-
-
-def _complain(message: str, exit_code: int) -> int:
-    print("error:", " ".join(message.split()), file=sys.stderr)
-    return exit_code
+        return complain(f"cannot print the results ({error.strerror}); give them another place to go", FAILURE)
 
 
 def _parse_options(given: list[str]) -> dict[str, Any]:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from autopoly_env.errors import AutoPolyError, ConfigError, SequenceError
+from agents.command import INTERRUPTED, run_command
+from autopoly_env.errors import ConfigError, SequenceError
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from autopoly_env.arrays import ByteArray
     from autopoly_env.mesh import PolyMesh
 
-FAILURE, USAGE_ERROR, INTERRUPTED = 1, 2, 130
 SHEET = "variants.png"
 CELL_SIZE = 256  # pixels of a mesh on the sheet
 MOST = 200  # variants
@@ -87,22 +87,7 @@ def vary(
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; whatever is wrong is told in one line on stderr. Returns the exit code."""
-    try:
-        code = app(arguments, prog_name="python -m agents.vary", standalone_mode=False) or 0
-        return _complain(STOPPED, code) if code == INTERRUPTED else code
-    except ConfigError as error:
-        return _complain(str(error), USAGE_ERROR)
-    except AutoPolyError as error:
-        return _complain(str(error), FAILURE)
-    except Exception as error:
-        if not hasattr(error, "format_message"):  # which typer's own usage errors have
-            raise
-        return _complain(f"{error.format_message()} (see --help)", USAGE_ERROR)
-
-
-def _complain(message: str, exit_code: int) -> int:
-    print("error:", " ".join(message.split()), file=sys.stderr)
-    return exit_code
+    return run_command(app, arguments, "python -m agents.vary", stopped=STOPPED)
 
 
 def _check(n: int, amount: float, seed: int) -> None:

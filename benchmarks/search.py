@@ -13,7 +13,8 @@ import typer
 from rich.console import Console
 from rich.status import Status
 
-from autopoly_env.errors import AutoPolyError, ConfigError
+from agents.command import run_command
+from autopoly_env.errors import ConfigError, SilhouetteError
 from autopoly_env.files import write_atomically
 from autopoly_env.image_files import find_images
 from benchmarks import report, search_rows
@@ -35,7 +36,6 @@ What was measured is kept in RECORDS/COMMAND.jsonl, a line for each agent and
 shape: a run that was stopped goes on where it was. --fresh measures anew, which
 changed code makes necessary; what the oracle found stays.
 """
-USAGE_ERROR, INTERRUPTED = 2, 130
 _FILE_WIDTH = 140  # columns, where the output is no terminal
 _EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 
@@ -177,7 +177,10 @@ def dominance(
 
 
 def _targets(folder: Path, limit: int | None) -> list[str]:
-    return [str(image) for image in find_images([folder])[:limit]]
+    try:
+        return [str(image) for image in find_images([folder])[:limit]]
+    except SilhouetteError as error:
+        raise ConfigError(str(error)) from None
 
 
 def _numbers(given: str) -> list[int]:
@@ -189,22 +192,8 @@ def _numbers(given: str) -> list[int]:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run a command; whatever is wrong is told in one line on stderr. Returns the exit code."""
-    try:
-        exit_code: int = app(arguments, prog_name="python -m benchmarks.search", standalone_mode=False) or 0
-    except AutoPolyError as error:
-        return _complain(str(error), USAGE_ERROR)
-    except Exception as error:
-        if not hasattr(error, "format_message"):  # which typer's own usage errors have
-            raise
-        return _complain(f"{error.format_message()} (see --help)", USAGE_ERROR)
-    if exit_code == INTERRUPTED:  # which typer makes of Ctrl-C
-        return _complain("stopped by Ctrl-C; what was measured is kept", INTERRUPTED)
-    return exit_code
-
-
-def _complain(message: str, exit_code: int) -> int:
-    print("error:", " ".join(message.split()), file=sys.stderr)
-    return exit_code
+    stopped = "stopped by Ctrl-C; what was measured is kept"
+    return run_command(app, arguments, "python -m benchmarks.search", stopped=stopped)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 import csv
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from PIL import Image
 
 from autopoly_env.mesh import PolyMesh
 from tests.browser import Browser, Page, needs_browser
+from tests.commands import Run, runner
 from training.compare import main
 from training.records import MeshData, Outcome, Record, RunInfo, target_path
 from training.report.axes import x_axis, y_axis
@@ -46,27 +47,11 @@ def records_of(agent: str, totals: dict[str, float], **more: Any) -> list[Record
     return [Record(agent, target, 0, outcome(total, **more)) for target, total in totals.items()]
 
 
-@dataclass(frozen=True)
-class Said:
-    code: int
-    out: str
-    err: str
-
-
-Run = Callable[..., Said]
-
-
 @pytest.fixture
 def run(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
     """Runs the command in this process, in a folder of its own."""
     monkeypatch.chdir(tmp_path)
-
-    def run_it(*arguments: object) -> Said:
-        capsys.readouterr()
-        code = main([str(argument) for argument in arguments])
-        return Said(code, *capsys.readouterr())
-
-    return run_it
+    return runner(main, capsys)
 
 
 # --- numbers

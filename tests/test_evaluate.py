@@ -9,9 +9,8 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ import pytest
 import shapely
 from PIL import Image
 
+from tests.commands import Run, Said, runner
 from tests.drawings import HOUSE, L_SHAPE, SQUARE, painted
 from tests.shapes import shapely_coverage
 from training import evaluate_run
@@ -43,7 +43,6 @@ agents:
 """
 LABELS = ["ground truth", "trace", "random", "dr-simple", "thrifty"]
 TIMES = ("seconds", "seconds_low", "seconds_high")
-Run = Callable[..., SimpleNamespace]
 
 
 @pytest.fixture(autouse=True)
@@ -56,14 +55,11 @@ def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 def run(capsys: pytest.CaptureFixture[str]) -> Run:
     """Runs the command in this process, on the serial engine unless told otherwise; gives `code`, `out` and `err`."""
 
-    def run_it(*arguments: object) -> SimpleNamespace:
+    def run_it(*arguments: object) -> Said:
         given = [str(argument) for argument in arguments]
         if "--engine" not in given and "--merge" not in given:
             given += ["--engine", "serial"]
-        capsys.readouterr()
-        code = main([*given, "--quiet"])
-        out, err = capsys.readouterr()
-        return SimpleNamespace(code=code, out=out, err=err)
+        return runner(main, capsys)(*given, "--quiet")
 
     return run_it
 

@@ -8,7 +8,6 @@ import sys
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -19,11 +18,11 @@ from agents.export import main
 from autopoly_env.export import to_obj
 from autopoly_env.export.formats import FORMATS
 from autopoly_env.sequence import ConstructionSequence
+from tests.commands import Run, runner
 from tests.constructions import STEPS, house
 
 ROOT = Path(__file__).parent.parent
 SVG = "{http://www.w3.org/2000/svg}"
-Run = Callable[..., SimpleNamespace]
 
 
 @pytest.fixture(autouse=True)
@@ -34,14 +33,7 @@ def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 @pytest.fixture
 def run(capsys: pytest.CaptureFixture[str]) -> Run:
     """Runs the command in this process; gives `code`, `out` and `err`."""
-
-    def run_it(*arguments: object) -> SimpleNamespace:
-        capsys.readouterr()
-        code = main([str(argument) for argument in arguments])
-        out, err = capsys.readouterr()
-        return SimpleNamespace(code=code, out=out, err=err)
-
-    return run_it
+    return runner(main, capsys)
 
 
 def saved(path: str = "house.json", sequence: ConstructionSequence | None = None) -> Path:

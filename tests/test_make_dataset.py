@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -20,6 +20,7 @@ from PIL import Image
 from autopoly_env.errors import AutoPolyError, OutputError, RunError
 from autopoly_env.files import write_atomically
 from autopoly_env.targets import ConstructionTargets
+from tests.commands import Run, runner
 from tests.shapes import shapely_coverage
 from training.build_dataset import MAX_N, MAX_SEED, SPLITS, Settings, build_dataset
 from training.dataset import Example, checksum, pack, read_manifest, read_shards, unpack
@@ -30,27 +31,11 @@ SERIAL = ("--engine", "serial", "--resolution", 64)
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 2\nf 1 2 3\nf 1 2 4\nf 2 3 4\nf 1 3 4\n"
 
 
-@dataclass(frozen=True)
-class Said:
-    code: int
-    out: str
-    err: str
-
-
-Run = Callable[..., Said]
-
-
 @pytest.fixture
 def run(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
     """Runs the command in this process, in a folder of its own."""
     monkeypatch.chdir(tmp_path)
-
-    def run_it(*arguments: object) -> Said:
-        capsys.readouterr()
-        code = main([str(argument) for argument in arguments])
-        return Said(code, *capsys.readouterr())
-
-    return run_it
+    return runner(main, capsys)
 
 
 def same(one: Example, other: Example) -> bool:

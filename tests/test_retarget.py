@@ -4,9 +4,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -23,8 +21,8 @@ from autopoly_env.placement import is_sane
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator
+from tests.commands import Run, runner
 
-Run = Callable[..., SimpleNamespace]
 ROOT = Path(__file__).parent.parent
 SCORE = {"iou": 0.5, "complexity": 9, "self_intersections": 0, "total": 50.0}
 
@@ -60,14 +58,7 @@ def run(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.
     monkeypatch.chdir(tmp_path)
     ell().save("ell.json")
     Image.fromarray(BOX.mask).convert("L").save("box.png")
-
-    def run_it(*arguments: object) -> SimpleNamespace:
-        capsys.readouterr()
-        code = main([str(argument) for argument in arguments])
-        out, err = capsys.readouterr()
-        return SimpleNamespace(code=code, out=out, err=err)
-
-    return run_it
+    return runner(main, capsys)
 
 
 @pytest.mark.parametrize("target", [TALL, TURNED], ids=["upright", "mirrored"])

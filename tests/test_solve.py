@@ -26,6 +26,7 @@ from autopoly_env.score import ScoreWeights, score
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import load_silhouette
 from autopoly_env.simulator import Simulator, State
+from tests.commands import Run, runner
 from tests.shapes import shapely_coverage
 
 ROOT = Path(__file__).parent.parent
@@ -44,19 +45,9 @@ def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 @pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., SimpleNamespace]:
+def run(capsys: pytest.CaptureFixture[str]) -> Run:
     """Runs the command in this process; gives `code`, `out` and `err`."""
-
-    def run_it(*arguments: object) -> SimpleNamespace:
-        capsys.readouterr()
-        code = main([str(argument) for argument in arguments])
-        out, err = capsys.readouterr()
-        return SimpleNamespace(code=code, out=out, err=err)
-
-    return run_it
-
-
-Run = Callable[..., SimpleNamespace]
+    return runner(main, capsys)
 
 
 def small_image(path: str, *, box: tuple[int, int, int, int] = (8, 8, 40, 56)) -> Path:

@@ -4,10 +4,8 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -25,10 +23,10 @@ from autopoly_env.mesh import PolyMesh
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence_file import Step
 from autopoly_env.variation import mirrored
+from tests.commands import Run, runner
 from tests.constructions import house
 from tests.sequences import gabled, walked
 
-Run = Callable[..., SimpleNamespace]
 ROOT = Path(__file__).parent.parent
 
 
@@ -36,14 +34,7 @@ ROOT = Path(__file__).parent.parent
 def run(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
     """Runs the command in an empty folder; gives `code`, `out` and `err`."""
     monkeypatch.chdir(tmp_path)
-
-    def run_it(*arguments: object) -> SimpleNamespace:
-        capsys.readouterr()
-        code = main([str(argument) for argument in arguments])
-        out, err = capsys.readouterr()
-        return SimpleNamespace(code=code, out=out, err=err)
-
-    return run_it
+    return runner(main, capsys)
 
 
 def position(mesh: PolyMesh, name: int) -> list[float]:

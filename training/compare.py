@@ -10,9 +10,9 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from agents.command import run_command
 from autopoly_env.errors import ConfigError
 from autopoly_env.files import write_atomically
-from training.command import run_command
 from training.report.comparison import Row, read_runs, rows_of
 from training.report.page import page_html
 from training.report.tables import FORMATS, as_record, csv_table, duel, markdown_table, plain

@@ -14,13 +14,13 @@ from rich.table import Table
 from torch import nn
 from torch.utils.flop_counter import FlopCounterMode
 
+from agents.command import run_command
 from agents.guided.config import NfapConfig, WarpConfig
 from agents.guided.layers import n_parameters
 from agents.guided.nfap import NfapNet
 from agents.guided.warp import WarpNet
 from agents.guided.weights import load_nfap, load_warpnet
 from autopoly_env.errors import ConfigError
-from training.command import run_command
 
 N_REPEATS = 9
 BATCHES = (1, 64)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from agents.command import FAILURE, INTERRUPTED, run_command
 from autopoly_env.errors import ConfigError
-from training.command import FAILURE, INTERRUPTED, run_command
 
 if TYPE_CHECKING:
     from training.suite import Suite
@@ -151,7 +151,7 @@ def _finish(folder: Path, baseline: str | None, as_json: bool) -> int:
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; whatever is wrong is told in one line on stderr. Returns the exit code."""
     try:
-        return run_command(app, arguments, "python -m training.evaluate")
+        return run_command(app, arguments, "python -m training.evaluate", stopped="")
     except OSError as error:
         if error.errno == errno.EPIPE:
             raise

@@ -10,8 +10,8 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from agents.command import FAILURE, INTERRUPTED, run_command
 from autopoly_env.errors import ConfigError
-from training.command import FAILURE, INTERRUPTED, run_command
 
 HELP = """Make data sets of targets, check them, draw silhouettes of 3-D models.
 
@@ -226,7 +226,7 @@ def _say(bar: Progress, text: str) -> None:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; whatever is wrong is told in one line on stderr. Returns the exit code."""
-    return run_command(app, arguments, "python -m training.make_dataset")
+    return run_command(app, arguments, "python -m training.make_dataset", stopped="")
 
 
 if __name__ == "__main__":

@@ -9,9 +9,9 @@ from typing import Annotated, Any
 
 import typer
 
+from agents.command import GOES_ON, run_command
 from autopoly_env.errors import ConfigError, RunError
 from autopoly_env.files import write_atomically
-from training.command import run_command
 from training.nfap_data import SourceConfig, build_trajectory
 from training.options import plain, read_config
 from training.parallel import map_tasks
@@ -93,7 +93,12 @@ def _claim(folder: Path, meta: dict[str, Any]) -> None:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; returns the exit code."""
-    return run_command(app, arguments, "python -m training.make_expert")
+    return run_command(
+        app,
+        arguments,
+        "python -m training.make_expert",
+        stopped=GOES_ON,
+    )
 
 
 if __name__ == "__main__":

@@ -19,9 +19,9 @@ import torch
 import typer
 from torch import Tensor, nn
 
+from agents.command import GOES_ON, run_command
 from agents.guided.config import NfapConfig
 from agents.guided.nfap import Foresight, NfapLabels, NfapNet, loss_terms
-from training.command import run_command
 from training.finish import finish_run
 from training.net_metrics import mean_rows, nfap_metrics
 from training.net_pictures import draw_nfap
@@ -153,7 +153,7 @@ def main_command(
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; returns the exit code."""
-    return run_command(app, arguments, "python -m training.train_nfap")
+    return run_command(app, arguments, "python -m training.train_nfap", stopped=GOES_ON)
 
 
 if __name__ == "__main__":

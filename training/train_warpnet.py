@@ -19,10 +19,10 @@ import torch
 import typer
 from torch import Tensor, nn
 
+from agents.command import GOES_ON, run_command
 from agents.guided.config import WarpConfig
 from agents.guided.warp import Theta, WarpLabels, WarpNet, loss_terms
 from autopoly_env.errors import ConfigError
-from training.command import run_command
 from training.finish import finish_run
 from training.net_metrics import mean_rows, warp_metrics
 from training.net_pictures import draw_warp
@@ -156,7 +156,12 @@ def main_command(
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; returns the exit code."""
-    return run_command(app, arguments, "python -m training.train_warpnet")
+    return run_command(
+        app,
+        arguments,
+        "python -m training.train_warpnet",
+        stopped=GOES_ON,
+    )
 
 
 if __name__ == "__main__":
