@@ -1,5 +1,7 @@
 """WarpNet: splines with known answers, the sampler and the transport against oracles, and that it learns."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -16,7 +18,7 @@ from agents.guided.tps import (
     transport,
     warp_pictures,
 )
-from agents.guided.warp import Theta, WarpLabels, WarpNet, loss_terms, move_grid
+from agents.guided.warp import Theta, WarpNet, loss_terms, move_grid
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.raster import coverage
@@ -144,33 +146,39 @@ def test_move_grid__is_the_affine_map_and_then_the_deformation() -> None:
     assert torch.allclose(found, affine_of(rest[None]) + deformation)
 
 
-def batch_of(n: int = 8) -> WarpLabels:
-    """Rectangles, and where they are to go."""
+def batch_of(n: int = 8) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    """Rectangles, and where they are to go: pictures, vertices, edges."""
     rng = np.random.default_rng(7)
     begin = [PolyMesh.rectangle(*(0.3 + 0.1 * rng.random(2)), *(0.6 + 0.2 * rng.random(2))) for _ in range(n)]
     goals = [mesh.with_vertices(mesh.vertices + 0.15 * (rng.random((4, 2)) - 0.5)) for mesh in begin]
     pictures = np.array([[coverage(a, 32), coverage(b, 32)] for a, b in zip(begin, goals, strict=True)], np.float32)
     vertices = np.array([mesh.vertices for mesh in begin], np.float32)
     edges = np.array([mesh.topology.boundary_half_edges for mesh in begin])
-    return WarpLabels(torch.from_numpy(pictures), torch.from_numpy(vertices), torch.from_numpy(edges))
+    return torch.from_numpy(pictures), torch.from_numpy(vertices), torch.from_numpy(edges)
 
 
-def test_net__untrained_leaves_everything_where_it_is() -> None:
-    net, batch = WarpNet(SMALL), batch_of()
-    theta = net(batch.pictures)
-    assert torch.allclose(net.goals(theta), net.rest.expand(8, -1, -1))
-    assert torch.allclose(net.carry(net.goals(theta), batch.vertices), batch.vertices, atol=1e-6)
-    start = float((batch.pictures[:, 0] - batch.pictures[:, 1]).square().mean())
-    assert loss_terms(net, theta, batch)["mesh"].item() == pytest.approx(start, rel=1e-3)
+NETS = pytest.mark.parametrize("config", [SMALL, replace(SMALL, deformation="local", passes=2)], ids=["paper", "local"])
 
 
-def test_net__learns_one_batch() -> None:
+@NETS
+def test_net__untrained_leaves_everything_where_it_is(config: WarpConfig) -> None:
+    net, (pictures, vertices, edges) = WarpNet(config), batch_of()
+    warps = net.warps(pictures, vertices, edges)
+    assert len(warps) == config.passes
+    assert torch.allclose(net.goals(warps[0].theta), net.rest.expand(8, -1, -1))
+    assert torch.allclose(warps[-1].vertices, vertices, atol=1e-6)
+    start = float((pictures[:, 0] - pictures[:, 1]).square().mean())
+    assert loss_terms(net, warps)["mesh"].item() == pytest.approx(start, rel=1e-3)
+
+
+@NETS
+def test_net__learns_one_batch(config: WarpConfig) -> None:
     torch.manual_seed(0)
-    net, batch = WarpNet(SMALL), batch_of()
+    net, batch = WarpNet(config), batch_of()
     optimizer = torch.optim.Adam(net.parameters(), lr=6e-3)
     losses = []
     for _ in range(30):
-        terms = loss_terms(net, net(batch.pictures), batch)
+        terms = loss_terms(net, net.warps(*batch))
         losses.append({name: term.item() for name, term in terms.items()})
         optimizer.zero_grad()
         (terms["image"] + terms["mesh"]).backward()
@@ -179,7 +187,21 @@ def test_net__learns_one_batch() -> None:
     assert losses[-1]["mesh"] < 0.5 * losses[0]["mesh"]
 
 
-@pytest.mark.parametrize("change", [{"grid": 1}, {"image_size": 48}, {"widths": (2, 2, 2, 2)}, {"feature": 0}])
+def test_warps__each_pass_sees_what_the_one_before_has_made() -> None:
+    torch.manual_seed(0)
+    net, (pictures, vertices, edges) = WarpNet(replace(SMALL, passes=3)), batch_of()
+    torch.nn.init.normal_(net.head.weight, std=0.01)
+    first, second, third = net.warps(pictures, vertices, edges)
+    for before, after in ((first, second), (second, third)):
+        assert torch.equal(after.pictures[:, 0], before.shown.clamp(0.0, 1.0)) and not after.pictures.requires_grad
+        assert torch.equal(after.pictures[:, 1], pictures[:, 1])
+        carried = net.carry(net.goals(after.theta), before.vertices)
+        assert torch.allclose(after.vertices, carried) and not torch.allclose(carried, before.vertices)
+
+
+@pytest.mark.parametrize(
+    "change", [{"grid": 1}, {"image_size": 48}, {"widths": (2, 2, 2, 2)}, {"feature": 0}, {"passes": 0}]
+)
 def test_config__refuses_what_cannot_be(change: dict[str, int]) -> None:
     with pytest.raises(ConfigError, match="expected"):
         WarpConfig(**change)

@@ -10,8 +10,6 @@ from torch import Tensor
 
 from agents.guided.config import CLASSES
 from agents.guided.nfap import Foresight, NfapNet
-from agents.guided.warp import Theta, WarpNet
-from autopoly_env.torch_raster import coverage
 from training.samples import Batch
 
 TOP = 3
@@ -98,15 +96,16 @@ def _share(mask: Tensor) -> float:
     return float(mask.float().mean())
 
 
-def warp_metrics(net: WarpNet, theta: Theta, batch: Batch) -> dict[str, float]:
+def warp_metrics(shown: Tensor, batch: Batch) -> dict[str, float]:
     """IoU before, after the warp, and after a full refit; "share": how much of the refit's gain the warp has.
+
+    `shown` (B, S, S) is the rendering after the warp.
 
     "share_kept": the same where the warped mesh is used only if it is better than the one before it, as the search
     does.
     """
     target = batch["pictures"][:, 1]
-    carried = net.carry(net.goals(theta), batch["vertices"])
-    warped = _iou(coverage(carried, batch["edges"], target.shape[-1]), target)
+    warped = _iou(shown, target)
     before, full = _iou(batch["pictures"][:, 0], target), _iou(batch["full"], target)
     gain = float((full - before).sum())
     return {

@@ -1,13 +1,14 @@
 """Pictures for the log of a training run: what the networks say beside the truth."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import torch
 from torch import Tensor
 
 from agents.guided.nfap import Foresight
 from agents.guided.tps import warp_pictures
-from agents.guided.warp import Theta, WarpNet
-from autopoly_env.torch_raster import coverage
+from agents.guided.warp import Warp, WarpNet
 from training.samples import Batch
 
 _GAP = 2  # pixels between pictures
@@ -27,12 +28,10 @@ def draw_nfap(said: Foresight, batch: Batch) -> np.ndarray:
     return _sheet(torch.stack(columns, 1))
 
 
-def draw_warp(net: WarpNet, theta: Theta, batch: Batch) -> np.ndarray:
-    """A row for each sample: current, target, current as warped, the carried mesh, the full refit."""
-    goals, target = net.goals(theta), batch["pictures"][:, 1]
-    warped = warp_pictures(batch["pictures"][:, :1], goals, net.rest)[:, 0]
-    carried = coverage(net.carry(goals, batch["vertices"]), batch["edges"], target.shape[-1])
-    return _sheet(torch.stack([batch["pictures"][:, 0], target, warped, carried, batch["full"]], 1))
+def draw_warp(net: WarpNet, warps: Sequence[Warp], batch: Batch) -> np.ndarray:
+    """A row for each sample: current, target, current as first warped, the mesh after all passes, the full refit."""
+    warped = warp_pictures(batch["pictures"][:, :1], net.goals(warps[0].theta), net.rest)[:, 0]
+    return _sheet(torch.stack([*batch["pictures"].unbind(1), warped, warps[-1].shown, batch["full"]], 1))
 
 
 def _sheet(pictures: Tensor) -> np.ndarray:

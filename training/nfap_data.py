@@ -1,8 +1,8 @@
 """Where labelled constructions come from: the random construction simulator, a teacher who tries everything, search.
 
 - "simulator", the paper's: the random sequence that made a target. The action that was taken is the label.
-- "teacher": from the rectangle or a few random steps after it, every legal action is refitted and scored; all of the
-  outcomes are the label, and the construction goes on with an action drawn from them.
+- "teacher": from the rectangle or a traced outline, or a few random steps after it, every legal action is refitted and
+  scored; all of the outcomes are the label, and the construction goes on with an action drawn from them.
 - "search": the sequence that an agent found for a target. The action that was taken is the label.
 
 Trajectory number i depends on (settings, i) alone.
@@ -30,6 +30,7 @@ from autopoly_env.simulator import Simulator, State
 from autopoly_env.targets import ConstructionTargets, ObjectTargets
 from training.trajectories import STOPPED, Labelled, Trajectory
 
+_TRACED_PRICES = (0.5, 4.0)  # of complexity, in units of the one that counts, that traced outlines are made for
 _HELD_OUT = 2**30  # first seed of the held-out targets; all are of the split "train", none of "test"
 
 
@@ -45,7 +46,9 @@ class SourceConfig:
     resolution: int = 128  # pixels a side of targets and scores
     operators: str = "full"
     w_sc: float = 0.3  # by which the teacher and the search judge
-    n_steps: int = 10  # of the teacher at most
+    n_steps: int = 16  # of the teacher at most, from the rectangle
+    n_traced: int = 5  # the same, from a traced outline
+    traced: float = 0.4  # share of the teacher's constructions that begin at one
     n_random: int = 2  # random steps before the teacher begins, at most
     play_temperature: float = 0.5  # r_all points: how freely the teacher draws its next action
     agent: str = "greedy"  # who searches
@@ -55,8 +58,12 @@ class SourceConfig:
     def __post_init__(self) -> None:
         if not 64 <= self.resolution <= 512:
             raise ConfigError(f"resolution {self.resolution}: expected 64 to 512 pixels a side")
-        if self.n_steps < 1 or self.n_random < 0 or self.refits < 1 or self.seed < 0:
-            raise ConfigError(f"{self}: expected n_steps and refits of at least 1, n_random and seed of at least 0")
+        if min(self.n_steps, self.n_traced, self.refits) < 1 or min(self.n_random, self.seed) < 0:
+            raise ConfigError(
+                f"{self}: expected n_steps, n_traced and refits of at least 1, n_random and seed of at least 0"
+            )
+        if not 0.0 <= self.traced <= 1.0:
+            raise ConfigError(f"traced = {self.traced}: expected a share, 0 to 1")
         if not self.play_temperature > 0.0:
             raise ConfigError(f"play_temperature = {self.play_temperature}: expected a number above 0")
 
@@ -69,13 +76,16 @@ def build_trajectory(config: SourceConfig, number: int, held_out: bool = False) 
         targets = _constructions(config)
         return _from_sequence(config, targets.sample(seed), targets.sample_sequence(seed))
     silhouette = _target(config, seed, number)
-    simulator = Simulator(
-        silhouette, operators=config.operators, resolution=config.resolution, weights=ScoreWeights(w_sc=config.w_sc)
-    )
+    simulator = _simulator(config, silhouette, config.w_sc)
     if config.source == "search":
         found = make_agent(config.agent).solve(simulator, Budget(refits=config.refits))
         return _from_sequence(config, silhouette, found.sequence)
     return _taught(config, simulator, rng)
+
+
+def _simulator(config: SourceConfig, silhouette: Silhouette, w_sc: float) -> Simulator:
+    weights = ScoreWeights(w_sc=w_sc)
+    return Simulator(silhouette, operators=config.operators, resolution=config.resolution, weights=weights)
 
 
 def _constructions(config: SourceConfig) -> ConstructionTargets:
@@ -89,15 +99,17 @@ def _target(config: SourceConfig, seed: int, number: int) -> Silhouette:
 
 
 def _taught(config: SourceConfig, simulator: Simulator, rng: np.random.Generator) -> Trajectory:
-    """Random steps, then the teacher's."""
-    state = simulator.initial()
+    """A start, random steps, then the teacher's."""
+    traced = bool(rng.random() < config.traced)
+    n_steps = config.n_traced if traced else config.n_steps
+    state = simulator.initial(_traced_mesh(config, simulator.silhouette, rng) if traced else None)
     for _ in range(int(rng.integers(config.n_random + 1))):
         actions = simulator.legal_actions(state)[1:]
         made = simulator.transition_all(state, [actions[int(rng.integers(len(actions)))]]) if actions else []
         if made and is_sane(made[0].mesh):
             state = made[0]
     states: list[Labelled] = []
-    while len(states) < config.n_steps and not state.done:
+    while len(states) < n_steps and not state.done:
         labelled, following = _teach(config, simulator, state, rng)
         states.append(labelled)
         if following is None:
@@ -105,6 +117,12 @@ def _taught(config: SourceConfig, simulator: Simulator, rng: np.random.Generator
         state = following
     states.append(Labelled(state.mesh, _parts(state.score), (), *_unknown(0), STOPPED))
     return Trajectory(simulator.silhouette.mask, tuple(states), ended=bool(state.done))
+
+
+def _traced_mesh(config: SourceConfig, silhouette: Silhouette, rng: np.random.Generator) -> PolyMesh:
+    """The best traced outline for a price of complexity near the one that counts."""
+    dearer = float(np.exp(rng.uniform(*np.log(_TRACED_PRICES))))
+    return make_agent("trace").solve(_simulator(config, silhouette, config.w_sc * dearer)).mesh
 
 
 def _teach(
@@ -133,9 +151,7 @@ def _row(rows: dict[Action, int], child: State) -> int:
 
 def _from_sequence(config: SourceConfig, silhouette: Silhouette, sequence: ConstructionSequence) -> Trajectory:
     """The states that a sequence goes through, with the action taken as their label; after the last one, stop."""
-    simulator = Simulator(
-        silhouette, operators=config.operators, resolution=config.resolution, weights=ScoreWeights(w_sc=config.w_sc)
-    )
+    simulator = _simulator(config, silhouette, config.w_sc)
     states = []
     for mesh, step in zip(sequence.meshes(), (*sequence.steps, None), strict=True):
         taken = None

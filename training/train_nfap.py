@@ -58,18 +58,17 @@ class TrainNfapConfig:
 class NfapLosses(nn.Module):
     """A batch to the terms of its loss."""
 
-    def __init__(self, net: NfapNet, weights: LossWeights, amp: bool) -> None:
+    def __init__(self, net: NfapNet, weights: LossWeights, run: RunConfig) -> None:
         super().__init__()
-        self.net, self.weights, self.amp = net, weights, amp
+        self.net, self.weights, self.run = net, weights, run
 
     def forward(self, batch: Batch) -> dict[str, Tensor]:
         """The terms; "loss" is their weighted sum."""
         return self.terms(self.foresee(batch), batch)
 
     def foresee(self, batch: Batch) -> Foresight:
-        """What the network says, in half precision on a GPU."""
-        device = batch["pictures"].device.type
-        with torch.autocast(device, torch.bfloat16, enabled=self.amp and device == "cuda"):
+        """What the network says, in half precision where the run wants it."""
+        with self.run.half_precision(batch["pictures"].device):
             said: Foresight = self.net(batch["pictures"])
         return said
 
@@ -90,7 +89,7 @@ class NfapTask:
         torch.manual_seed(config.run.seed)
         self.config = config
         self.net = NfapNet(config.net)
-        self.losses = NfapLosses(self.net, config.loss, config.run.amp)
+        self.losses = NfapLosses(self.net, config.loss, config.run)
         learn, self._test = config.data.trajectories()
         self.stream = NfapStream(learn, config.net, config.labels, config.run.seed)
         self._held_out: list[Batch] = []

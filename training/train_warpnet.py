@@ -21,7 +21,7 @@ from torch import Tensor, nn
 
 from agents.command import GOES_ON, run_command
 from agents.guided.config import WarpConfig
-from agents.guided.warp import Theta, WarpLabels, WarpNet, loss_terms
+from agents.guided.warp import Theta, Warp, WarpNet, loss_terms
 from autopoly_env.errors import ConfigError
 from training.finish import finish_run
 from training.net_metrics import mean_rows, warp_metrics
@@ -62,24 +62,26 @@ class TrainWarpnetConfig:
 class WarpLosses(nn.Module):
     """A batch to the terms of its loss."""
 
-    def __init__(self, net: WarpNet, weights: LossWeights, amp: bool) -> None:
+    def __init__(self, net: WarpNet, weights: LossWeights, run: RunConfig) -> None:
         super().__init__()
-        self.net, self.weights, self.amp = net, weights, amp
+        self.net, self.weights, self.run = net, weights, run
 
     def forward(self, batch: Batch) -> dict[str, Tensor]:
         """The terms; "loss" is their weighted sum."""
-        return self.terms(self.theta(batch), batch)
+        return self.terms(self.warps(batch))
 
-    def theta(self, batch: Batch) -> Theta:
-        """What the network says, in half precision on a GPU."""
-        device = batch["pictures"].device.type
-        with torch.autocast(device, torch.bfloat16, enabled=self.amp and device == "cuda"):
-            said: Theta = self.net(batch["pictures"])
+    def warps(self, batch: Batch) -> list[Warp]:
+        """What becomes of the batch's meshes; the network itself computes in half precision where the run wants it."""
+        return self.net.warps(batch["pictures"], batch["vertices"], batch["edges"], self._think)
+
+    def _think(self, pictures: Tensor) -> Theta:
+        with self.run.half_precision(pictures.device):
+            said: Theta = self.net(pictures)
         return said
 
-    def terms(self, theta: Theta, batch: Batch) -> dict[str, Tensor]:
-        """The terms of what the network has said."""
-        terms = loss_terms(self.net, theta, WarpLabels(batch["pictures"], batch["vertices"], batch["edges"]))
+    def terms(self, warps: list[Warp]) -> dict[str, Tensor]:
+        """The terms of what has become of them."""
+        terms = loss_terms(self.net, warps, with_image=self.weights.image > 0.0)
         weighted = [getattr(self.weights, name) * term for name, term in terms.items()]
         return {"loss": torch.stack(weighted).sum(), **terms}
 
@@ -93,7 +95,7 @@ class WarpTask:
         torch.manual_seed(config.run.seed)
         self.config = config
         self.net = WarpNet(config.net)
-        self.losses = WarpLosses(self.net, config.loss, config.run.amp)
+        self.losses = WarpLosses(self.net, config.loss, config.run)
         learn, self._test = config.data.trajectories()
         self.stream = WarpStream(learn, config.net, config.run.seed, config.placed_share)
         self._held_out: list[Batch] = []
@@ -112,15 +114,15 @@ class WarpTask:
         rows = []
         for batch in self.held_out():
             batch = {name: tensor.to(device) for name, tensor in batch.items()}
-            theta = self.losses.theta(batch)
-            terms = {name: float(term) for name, term in self.losses.terms(theta, batch).items()}
-            rows.append({**terms, **warp_metrics(self.net, theta, batch)})
+            warps = self.losses.warps(batch)
+            terms = {name: float(term) for name, term in self.losses.terms(warps).items()}
+            rows.append({**terms, **warp_metrics(warps[-1].shown, batch)})
         return mean_rows(rows)
 
     def draw(self, device: torch.device) -> Any:
-        """Current, target, as warped, the carried mesh, the full refit."""
+        """Current, target, as warped at first, the carried mesh in the end, the full refit."""
         batch = {name: tensor[:N_DRAWN].to(device) for name, tensor in self.held_out()[0].items()}
-        return draw_warp(self.net, self.losses.theta(batch), batch)
+        return draw_warp(self.net, self.losses.warps(batch), batch)
 
 
 HELP = """Train WarpNet: the warp that takes the rendering of a mesh to the target.

@@ -58,7 +58,7 @@ class RunConfig:
 
     seed: int = 0
     device: Literal["auto", "cpu", "cuda"] = "auto"
-    amp: bool = True  # half precision in the networks where there is a GPU
+    amp: Literal["gpu", "always", "never"] = "gpu"  # bfloat16 in the networks; on CPUs it pays with AVX512-BF16 or AMX
     n_workers: int = 1  # processes that make samples; 0: this one does
     n_threads: int = 0  # of torch; 0: as it likes
     log_every: int = 20  # steps
@@ -71,6 +71,11 @@ class RunConfig:
             raise ConfigError(f"{self}: expected log_every, eval_every, save_every and patience of at least 1")
         if min(self.seed, self.n_workers, self.n_threads) < 0:
             raise ConfigError(f"{self}: expected a seed, n_workers and n_threads of at least 0")
+
+    def half_precision(self, device: torch.device) -> torch.autocast:
+        """The context in which networks compute, in bfloat16 where it is wanted."""
+        wanted = self.amp == "always" or (self.amp == "gpu" and device.type == "cuda")
+        return torch.autocast(device.type, torch.bfloat16, enabled=wanted)
 
 
 class Task(Protocol):

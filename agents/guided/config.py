@@ -71,10 +71,12 @@ class NfapConfig:
 
 @dataclass(frozen=True)
 class WarpConfig:
-    """WarpNet. The paper leaves M open."""
+    """WarpNet. The defaults are the paper's, which leaves M open."""
 
     image_size: int = 64  # S
     grid: int = 6  # M
+    deformation: Literal["global", "local"] = "global"  # from the feature alone, or from feature maps around each point
+    passes: int = 1  # warps in a row, each of what the one before it has made
     feature: int = 128
     widths: tuple[int, int, int, int] = (16, 32, 48, 64)
 
@@ -82,6 +84,8 @@ class WarpConfig:
         _check_network(self.image_size, self.widths, self.feature)
         if not 2 <= self.grid <= 16:
             raise ConfigError(f"grid {self.grid}: expected 2 to 16 control points a side")
+        if not 1 <= self.passes <= 8:
+            raise ConfigError(f"passes {self.passes}: expected 1 to 8 warps in a row")
 
 
 @dataclass(frozen=True)

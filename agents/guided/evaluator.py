@@ -9,9 +9,11 @@ for a softmax of r_all over a temperature is exact. Letters: A actions, K operat
 from collections import OrderedDict
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from agents.guided.config import class_of
 from agents.guided.nfap import NfapNet
@@ -149,17 +151,23 @@ class WarpEvaluator(NfapEvaluator):
                 continue
 
     def _warped(self, simulator: Simulator, meshes: Sequence[PolyMesh]) -> list[PolyMesh]:
-        """The meshes with their vertices carried by the warp of each to the target."""
+        """The meshes with their vertices carried by the warps of each to the target."""
         size = self._warp.config.image_size
         target = simulator.silhouette.target(size).coverage.astype(np.float32)
         pictures = np.stack([np.stack((rendering(mesh, size), target)) for mesh in meshes])
-        vertices = np.zeros((len(meshes), max(len(mesh.vertices) for mesh in meshes), 2), np.float32)
-        for row, mesh in zip(vertices, meshes, strict=True):
-            row[: len(mesh.vertices)] = mesh.vertices
+        vertices = _padded([mesh.vertices.astype(np.float32) for mesh in meshes], 0)
+        edges = _padded([mesh.topology.boundary_half_edges for mesh in meshes], -1)
         with torch.inference_mode():
-            goals = self._warp.goals(self._warp(torch.from_numpy(pictures)))
-            carried = self._warp.carry(goals, torch.from_numpy(vertices)).double().numpy()
+            carried = self._warp.warps(torch.from_numpy(pictures), vertices, edges)[-1].vertices.double().numpy()
         return [mesh.with_vertices(row[: len(mesh.vertices)]) for row, mesh in zip(carried, meshes, strict=True)]
+
+
+def _padded(arrays: Sequence[NDArray[Any]], padding: int) -> torch.Tensor:
+    """Arrays (n, 2) of different lengths as one tensor (B, longest, 2)."""
+    batch = np.full((len(arrays), max(map(len, arrays)), 2), padding, arrays[0].dtype)
+    for row, array in zip(batch, arrays, strict=True):
+        row[: len(array)] = array
+    return torch.from_numpy(batch)
 
 
 def _better(
