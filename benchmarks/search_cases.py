@@ -19,7 +19,7 @@ from autopoly_env.simulator import Simulator
 from autopoly_env.targets import make_targets, split_seed
 from training.parallel import map_tasks
 
-CONSTRUCTION = "construction:"  # begins the name of a target of the construction simulator, its test seed follows
+_MADE = ("construction", "objects")  # kinds of targets that are made: KIND:SEED, a seed of the test split
 RESOLUTION = 128
 _WARM_UP = Budget(refits=30)
 
@@ -28,7 +28,7 @@ _WARM_UP = Budget(refits=30)
 class Case:
     """What is to be solved, by whom, and how long he may take."""
 
-    target: str  # "construction:SEED" or the path of an image
+    target: str  # "construction:SEED", "objects:SEED" or the path of an image
     agent: str
     w_sc: float
     options: str = "{}"  # of the agent, as JSON
@@ -62,15 +62,16 @@ def with_options(case: Case, **options: Any) -> Case:
     return Case(**{**asdict(case), "options": json.dumps(options, sort_keys=True)})
 
 
-def constructions(n: int) -> list[str]:
-    """The first n test targets of the construction simulator."""
-    return [f"{CONSTRUCTION}{index}" for index in range(n)]
+def made(kind: str, n: int) -> list[str]:
+    """The first n test targets of a kind."""
+    return [f"{kind}:{index}" for index in range(n)]
 
 
 def target_of(name: str) -> Silhouette:
     """The silhouette of a case's target."""
-    if name.startswith(CONSTRUCTION):
-        return make_targets("construction").sample(split_seed("test", int(name.removeprefix(CONSTRUCTION))))
+    kind, _, seed = name.partition(":")
+    if kind in _MADE:
+        return make_targets(kind).sample(split_seed("test", int(seed)))
     return load_silhouette(name)
 
 
@@ -129,7 +130,7 @@ _SOLVERS: dict[str, _Solver] = {"random": best_of_plays}
 
 @cache
 def _warm_up() -> None:
-    simulator = Simulator(target_of(f"{CONSTRUCTION}0"), resolution=RESOLUTION)
+    simulator = Simulator(target_of("construction:0"), resolution=RESOLUTION)
     for agent in ("mcts", "beam"):
         make_agent(agent).solve(simulator, _WARM_UP)
 

@@ -18,7 +18,7 @@ from autopoly_env import refit_kernels, tuning
 from autopoly_env.arrays import FloatArray
 from autopoly_env.parallel import set_threads
 from benchmarks.report import Must, Row, not_measured
-from benchmarks.search_cases import Case, Results, constructions, measure, simulator_of, with_options
+from benchmarks.search_cases import Case, Results, made, measure, simulator_of, with_options
 from training.report.statistics import Interval, bootstrap_mean
 
 WEIGHTS = (0.3, 1.0)  # w_sc
@@ -50,8 +50,8 @@ Totals = dict[tuple[str, float, int], Interval]  # (agent, w_sc, refits) -> mean
 
 def gap_rows(complete: Complete, oracle: Complete, limit: int, refits: int, width: int) -> Iterator[Row]:
     """How far `mcts` stays below the oracle on constructions, w_sc 1."""
-    best = [with_options(Case(target, "oracle", 1.0), width=width) for target in constructions(limit)]
-    ours = [Case(target, "mcts", 1.0, refits=refits) for target in constructions(limit)]
+    best = [with_options(Case(target, "oracle", 1.0), width=width) for target in made("construction", limit)]
+    ours = [Case(target, "mcts", 1.0, refits=refits) for target in made("construction", limit)]
     reached, found = _totals(best, oracle(best)), _totals(ours, complete(ours))
     both = [target for target in found if target in reached]
     if not both:

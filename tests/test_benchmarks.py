@@ -16,7 +16,7 @@ from autopoly_env import refit_kernels
 from autopoly_env.errors import OutputError
 from benchmarks import search, search_cases, search_rows
 from benchmarks.curve_picture import draw_curves
-from benchmarks.search_cases import Case, Found, Records, Results, best_of_plays, constructions, target_of
+from benchmarks.search_cases import Case, Found, Records, Results, best_of_plays, made, target_of
 from tests.test_agents import simulator
 from training.report.statistics import Interval
 
@@ -86,8 +86,8 @@ def test_records__tell_of_a_case_that_fails_and_go_on(tmp_path: Path) -> None:
         Records(tmp_path)
 
 
-def test_constructions__are_the_test_targets() -> None:
-    assert constructions(2) == ["construction:0", "construction:1"]
+def test_made__are_the_test_targets() -> None:
+    assert made("construction", 2) == ["construction:0", "construction:1"]
     assert target_of("construction:1").name == f"construction_{2**31 + 1}"
 
 

@@ -10,12 +10,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 import torch
 
 from agents.base import Budget
 from agents.guided.config import CLASSES, NfapConfig, WarpConfig, class_of
 from agents.guided.evaluator import NfapEvaluator, WarpEvaluator
-from agents.guided.nfap import NfapLabels, NfapNet, loss_terms
+from agents.guided.measures import N_MEASURES, action_measures, action_spots
+from agents.guided.nfap import NfapLabels, NfapNet, candidates_of, loss_terms
 from agents.guided.pictures import draw_inputs
 from agents.guided.regions import N_POINTS, action_points, region_image
 from agents.guided.warp import WarpNet
@@ -26,6 +28,7 @@ from autopoly_env.actions import STOP, Action, legal_actions
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import OPERATORS, PRESETS
+from autopoly_env.placement import Disagreement
 from autopoly_env.raster import coverage
 from autopoly_env.score import ScoreWeights
 from autopoly_env.simulator import Simulator
@@ -170,13 +173,13 @@ def test_choice__reads_its_own_operators_region_and_the_residual() -> None:
     assert (logits[1] - logits[0]).item() == pytest.approx(1.0 - 0.25)
 
 
-@pytest.mark.parametrize("config", [PAPER, RICH], ids=["paper", "rich"])
+@pytest.mark.parametrize("config", [PAPER, RICH, replace(RICH, judge=True)], ids=["paper", "rich", "judge"])
 def test_net__learns_one_batch(config: NfapConfig) -> None:
     stream = NfapStream(Live(SourceConfig(source="simulator", difficulty=(2, 3))), config, LabelConfig(), seed=0)
     batch = collate([stream[i] for i in range(8)])
     net = make_net(config).train()
     optimizer = torch.optim.Adam(net.parameters(), lr=2e-2)
-    truth = NfapLabels(**{name: batch[name] for name in NfapLabels.__dataclass_fields__})
+    truth = NfapLabels.of(batch)
     losses = []
     for _ in range(25):
         terms = loss_terms(net, net(batch["pictures"]), truth)
@@ -185,6 +188,50 @@ def test_net__learns_one_batch(config: NfapConfig) -> None:
         torch.stack(list(terms.values())).sum().backward()
         optimizer.step()
     assert all(losses[-1][name] < 0.8 * losses[0][name] for name in ("image", "operator", "choice"))
+
+
+# --- measures ---
+
+
+def test_action_measures__are_those_of_the_edge_to_blame() -> None:
+    mesh = PolyMesh.rectangle(0.25, 0.25, 0.75, 0.75)
+    target = painted(shapely.box(0.25, 0.25, 1.0, 0.75))  # wider
+    actions = [Action("edge_subdivide", k) for k in range(4)]
+    measures = action_measures(Disagreement(mesh, target), actions)
+    right = mesh.edge_index(1, 2)
+    assert measures.shape == (4, N_MEASURES)
+    assert measures[:, 0] == pytest.approx(0.5)  # lengths
+    assert measures[right, 1] == pytest.approx(np.sqrt(0.25 * 0.5), rel=0.05)  # missing
+    assert measures[right, 2] == pytest.approx(0.25, abs=0.02)  # its depth
+    assert np.delete(measures, right, axis=0)[:, 1:5].max() == 0.0
+    assert measures[:, 7] == pytest.approx(measures[right, 1])  # of all edges in sum
+
+
+def test_action_measures__a_vertex_spans_more_the_more_it_bulges() -> None:
+    mesh = PolyMesh.from_faces([(0.2, 0.2), (0.5, 0.1), (0.8, 0.2), (0.8, 0.8), (0.5, 0.6), (0.2, 0.8)], [range(6)])
+    actions = [Action("vertex_dissolve", k) for k in range(6)]
+    spanned = action_measures(Disagreement(mesh, painted(HOUSE)), actions)[:, 5]
+    assert spanned[1] == pytest.approx(np.sqrt(0.5 * 0.6 * 0.1))
+    assert spanned[4] == pytest.approx(-np.sqrt(0.5 * 0.6 * 0.2))  # it dents
+    spots = action_spots(mesh, actions, action_points(mesh, actions))
+    assert spots[1, :, 1] == pytest.approx(0.2) and spots[1, :, 0].mean() == pytest.approx(0.5)
+
+
+def test_judge__begins_as_no_correction_and_does_not_mind_how_edges_are_numbered() -> None:
+    config = replace(RICH, judge=True)
+    net = make_net(config)
+    stream = NfapStream(Live(SourceConfig(source="simulator", difficulty=(2, 3))), config, LabelConfig(), seed=0)
+    batch = collate([stream[0]])
+    said, candidates = net(batch["pictures"]), candidates_of(batch)
+    without = net.choice_logits(
+        said.operators[:, 0], said.regions[:, 0], candidates.points, candidates.classes, candidates.log_residual
+    )
+    assert torch.equal(net.choose(said, candidates), without)
+    assert net.judge is not None
+    torch.nn.init.normal_(net.judge.last.weight)
+    there, back = candidates, replace(candidates, spots=candidates.spots.flip(2))
+    assert not torch.allclose(net.choose(said, there), without)
+    assert torch.allclose(net.choose(said, there), net.choose(said, back), atol=1e-5)
 
 
 # --- evaluators ---

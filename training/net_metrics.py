@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from agents.guided.config import CLASSES
-from agents.guided.nfap import Foresight, NfapNet
+from agents.guided.nfap import Foresight, NfapNet, candidates_of
 from training.samples import Batch
 
 TOP = 3
@@ -43,9 +43,7 @@ def nfap_metrics(net: NfapNet, said: Foresight, batch: Batch) -> dict[str, float
     }
     if not bool(rows.any()):
         return found | dict.fromkeys(_ranked_names(), float("nan"))
-    prior = net.choice_logits(
-        said.operators[:, 0], said.regions[:, 0], batch["points"], batch["classes"], batch["log_residual"]
-    )[rows]
+    prior = net.choose(said, candidates_of(batch))[rows]
     residual = batch["log_residual"][rows].masked_fill(batch["classes"][rows] < 0, -torch.inf)
     for suffix, logits in (("", prior), ("_residual", residual)):
         found |= {name + suffix: value for name, value in _ranked(logits, batch, rows).items()}

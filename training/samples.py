@@ -15,8 +15,9 @@ from torch import Tensor
 from torch.utils.data import DataLoader, Dataset, Sampler
 
 from agents.guided.config import CLASSES, STOP_CLASS, NfapConfig, WarpConfig, class_of
+from agents.guided.measures import candidate_arrays
 from agents.guided.pictures import draw_inputs, rendering
-from agents.guided.regions import action_points, region_image
+from agents.guided.regions import region_image
 from autopoly_env.actions import STOP, Action
 from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.mesh import PolyMesh
@@ -82,8 +83,7 @@ def nfap_sample(trajectory: Trajectory, k: int, config: NfapConfig, labels: Labe
         "regions": np.stack((expected, *regions[1:])),
         "operators": np.array(operators),
         "first": first.astype(np.float32),
-        "points": action_points(state.mesh, state.actions).astype(np.float32),
-        "classes": classes,
+        **candidate_arrays(state.mesh, state.actions, trajectory.silhouette),
         "log_residual": state.log_residual,
         "policy": (policy[1:] / moving if moving > 1e-6 else 0.0 * policy[1:]).astype(np.float32),
         "gains": np.where(np.isfinite(gains), gains, -1e3).astype(np.float32),
@@ -155,7 +155,7 @@ def _turned(name: str, array: np.ndarray, way: int) -> np.ndarray:
         array = array[..., ::-1] if mirror_x else array
         array = array[..., ::-1, :] if mirror_y else array
         return np.ascontiguousarray(np.swapaxes(array, -1, -2) if transpose else array)
-    if name in ("points", "vertices"):
+    if name in ("points", "spots", "vertices"):
         at = array.copy()
         at[..., 0] = 1.0 - at[..., 0] if mirror_x else at[..., 0]
         at[..., 1] = 1.0 - at[..., 1] if mirror_y else at[..., 1]

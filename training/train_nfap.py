@@ -74,8 +74,7 @@ class NfapLosses(nn.Module):
 
     def terms(self, said: Foresight, batch: Batch) -> dict[str, Tensor]:
         """The terms of what the network has said."""
-        truth = NfapLabels(**{name: batch[name] for name in NfapLabels.__dataclass_fields__})
-        terms = loss_terms(self.net, said, truth)
+        terms = loss_terms(self.net, said, NfapLabels.of(batch))
         weighted = [getattr(self.weights, name) * term for name, term in terms.items()]
         return {"loss": torch.stack(weighted).sum(), **terms}
 

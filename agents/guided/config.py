@@ -60,6 +60,7 @@ class NfapConfig:
     skips: bool = False  # the decoders see the encoder's feature maps, too
     regions: Regions = "one"  # action-region images a stage: one, or one for each operator class
     residual: bool = False  # the prior is a learned correction of the residual prior, not the networks' alone
+    judge: bool = False  # a head looks at each action's own place and measures, and corrects what the regions say
 
     def __post_init__(self) -> None:
         _check_network(self.image_size, self.widths, self.feature)

@@ -15,10 +15,9 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from agents.guided.config import class_of
-from agents.guided.nfap import NfapNet
+from agents.guided.measures import candidate_arrays
+from agents.guided.nfap import Foresight, NfapNet, candidates_of
 from agents.guided.pictures import draw_inputs, rendering
-from agents.guided.regions import action_points
 from agents.guided.warp import WarpNet
 from agents.guided.weights import Meta
 from agents.search.evaluator import ResidualEvaluator
@@ -33,9 +32,7 @@ from autopoly_env.simulator import Simulator, State
 
 _FLOOR = 1e-4  # of the likeliest action, for all
 _BATCH = 16  # states that are evaluated at once at most
-_REMEMBERED = 512  # states whose evaluation is kept
-
-_Said = tuple[torch.Tensor, torch.Tensor]  # operators (1, K) and regions (1, 1 or K, S, S) of stage 1
+_REMEMBERED = 256  # states whose evaluation is kept
 
 
 class NfapEvaluator:
@@ -48,16 +45,15 @@ class NfapEvaluator:
         self._label_temperature = float(labels.get("temperature", 1.0))
         self._residual = ResidualEvaluator()
         self._target: Silhouette | None = None  # that the following two are about
-        self._said: OrderedDict[PolyMesh, _Said] = OrderedDict()
+        self._said: OrderedDict[PolyMesh, Foresight] = OrderedDict()
         self._waiting: list[PolyMesh] = []  # made and not evaluated yet: they are, with the next one that is asked for
 
     def prior(self, simulator: Simulator, state: State, actions: Sequence[Action]) -> FloatArray:
-        operators, regions = self._first_stage(simulator, state)
-        points = torch.from_numpy(action_points(state.mesh, actions)).float()[None]
-        classes = torch.tensor([[class_of(action) for action in actions]])
-        residual = np.log(self._residual.prior(simulator, state, actions))
+        arrays = candidate_arrays(state.mesh, actions, simulator.silhouette)
+        arrays["log_residual"] = np.log(self._residual.prior(simulator, state, actions)).astype(np.float32)
+        candidates = candidates_of({name: torch.from_numpy(array)[None] for name, array in arrays.items()})
         with torch.inference_mode():
-            logits = self._net.choice_logits(operators, regions, points, classes, torch.from_numpy(residual)[None])
+            logits = self._net.choose(self._first_stage(simulator, state), candidates)
         corrected = logits[0].double().numpy() - self._extra_price(simulator, actions)
         odds = np.exp((corrected - corrected.max()) / self._temperature)
         odds += _FLOOR
@@ -84,7 +80,7 @@ class NfapEvaluator:
         dearer = (simulator.weights.w_sc - self._trained_w_sc) / self._label_temperature
         return dearer * np.array([float(sum(_changes(action))) for action in actions])
 
-    def _first_stage(self, simulator: Simulator, state: State) -> _Said:
+    def _first_stage(self, simulator: Simulator, state: State) -> Foresight:
         """What the network says of a state; shapes that wait are evaluated in the same batch."""
         self._turn_to(simulator.silhouette)
         if state.mesh not in self._said:
@@ -101,8 +97,7 @@ class NfapEvaluator:
         with torch.inference_mode():
             said = self._net(torch.from_numpy(pictures), n_stages=1, with_images=False)
         for row, mesh in enumerate(meshes):
-            once = slice(row, row + 1)
-            self._said[mesh] = said.operators[once, 0], said.regions[once, 0]
+            self._said[mesh] = said.row(row)
         while len(self._said) > _REMEMBERED:
             self._said.popitem(last=False)
 

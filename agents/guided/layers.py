@@ -51,11 +51,24 @@ class Decoder(nn.Module):
         n_last = widths[0] * (2 if skips else 1)
         self.end = nn.Conv2d(n_last, 4 * n_outputs, 3, padding=1)
 
+    @property
+    def n_last(self) -> int:
+        """Channels of what `last_maps` gives."""
+        return self.end.in_channels
+
     def forward(self, feature: Tensor, maps: Sequence[Tensor]) -> Tensor:
+        return self.draw(self.last_maps(feature, maps))
+
+    def draw(self, last: Tensor) -> Tensor:
+        """The pictures, from `last_maps`."""
+        return functional.pixel_shuffle(self.end(last), 2)
+
+    def last_maps(self, feature: Tensor, maps: Sequence[Tensor]) -> Tensor:
+        """(B, C, S/2, S/2) what the pictures are drawn from."""
         x = functional.relu(self.begin(feature)).unflatten(1, (-1, self.size, self.size))
         for level, skip in zip(self.levels, reversed(maps[1:]), strict=True):
             x = functional.interpolate(level(self._joined(x, skip)), scale_factor=2.0, mode="nearest")
-        return functional.pixel_shuffle(self.end(self._joined(x, maps[0])), 2)
+        return self._joined(x, maps[0])
 
     def begin_with(self, logit: float) -> None:
         """Let the pictures be about `logit` everywhere before anything is learnt."""

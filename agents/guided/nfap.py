@@ -1,8 +1,10 @@
 """nFAP-Net: the next n actions, where they work, and what the shape looks like after each (paper, section 4.1).
 
-Letters: B batch, n stages, S pixels a side, K operator classes, A actions, P points of each.
+Letters: B batch, n stages, S pixels a side, K operator classes, A actions, P points and M measures of each, D numbers
+in the feature, C channels.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import torch
@@ -11,6 +13,7 @@ from torch.nn import functional
 
 from agents.guided.config import CLASSES, NfapConfig
 from agents.guided.layers import Decoder, Encoder
+from agents.guided.measures import N_MEASURES
 
 _MAX_LOG_ODDS = 8.0
 _RARE = -3.0  # log-odds of a pixel to lie in a region, before anything is learnt
@@ -23,6 +26,58 @@ class Foresight:
     operators: Tensor  # (B, n, K)
     regions: Tensor  # (B, n, K or 1, S, S)
     images: Tensor | None  # (B, n, S, S), of the shape after the stage's action
+    feature: Tensor  # (B, D) the LSTM's state of stage 1
+    maps: Tensor  # (B, C, S/2, S/2) what the regions of stage 1 are drawn from
+
+    def row(self, k: int) -> "Foresight":
+        """What is said of one sample, as a batch of one; copies, so that the others can be forgotten."""
+        images = None if self.images is None else self.images[k : k + 1].clone()
+        parts = (self.operators, self.regions, self.feature, self.maps)
+        operators, regions, feature, maps = (part[k : k + 1].clone() for part in parts)
+        return Foresight(operators, regions, images, feature, maps)
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """The legal actions of a batch of states; rows whose class is -1 are padding."""
+
+    points: Tensor  # (B, A, P, 2) where to read the regions, unit square
+    classes: Tensor  # (B, A)
+    log_residual: Tensor  # (B, A)
+    spots: Tensor  # (B, A, P, 2) and (B, A, M): see `agents.guided.measures`
+    measures: Tensor
+
+
+class _Judge(nn.Module):
+    """A correction of the logit of each action, 0 before anything is learnt.
+
+    It reads the decoder's maps at the action's spots (mean and maximum of what a layer makes of each, so their order
+    does not matter), the action's class and measures, the residual prior, and the feature of the whole.
+    """
+
+    def __init__(self, n_maps: int, feature: int, width: int = 48) -> None:
+        super().__init__()
+        self.place = nn.Linear(n_maps, width)
+        self.whole = nn.Linear(feature, width)
+        self.kind = nn.Embedding(len(CLASSES), width)
+        self.first = nn.Linear(4 * width + N_MEASURES + 1, 2 * width)
+        self.second = nn.Linear(2 * width, width)
+        self.last = nn.Linear(width, 1)
+        nn.init.zeros_(self.last.weight)
+        nn.init.zeros_(self.last.bias)
+
+    def forward(self, maps: Tensor, feature: Tensor, candidates: Candidates) -> Tensor:
+        """(B, A)"""
+        at = 2.0 * candidates.spots.to(maps.dtype) - 1.0
+        seen = functional.grid_sample(maps, at, padding_mode="border", align_corners=False)  # (B, C, A, P)
+        places = functional.relu(self.place(seen.permute(0, 2, 3, 1)))
+        kinds = self.kind(candidates.classes.clamp(min=0))
+        whole = functional.relu(self.whole(feature))[:, None].expand_as(kinds)
+        measures = 4.0 * candidates.measures.to(maps.dtype)
+        residual = candidates.log_residual.to(maps.dtype)[..., None] / 4.0
+        x = torch.cat((places.mean(2), places.amax(2), kinds, whole, measures, residual), -1)
+        x = functional.relu(self.second(functional.relu(self.first(x))))
+        return self.last(x)[..., 0]
 
 
 class NfapNet(nn.Module):
@@ -41,19 +96,32 @@ class NfapNet(nn.Module):
         self.region_weight = nn.Parameter(torch.ones(len(CLASSES)))
         self.residual_weight = nn.Parameter(torch.ones(())) if config.residual else None
         self.region_decoder.begin_with(_RARE)
+        self.judge = _Judge(self.region_decoder.n_last, feature) if config.judge else None
 
     def forward(self, pictures: Tensor, n_stages: int | None = None, with_images: bool = True) -> Foresight:
         """Foresee `n_stages` (by default n) from pictures (B, C, S, S)."""
         feature, maps = self.encoder(pictures)
         state = torch.zeros_like(feature), torch.zeros_like(feature)
-        operators, regions, images = [], [], []
+        operators, regions, images, firsts = [], [], [], []
         for _ in range(n_stages or self.config.n):
             state = self.memory(feature, state)
             operators.append(self.action_head(state[0]))
-            regions.append(self.region_decoder(state[0], maps))
+            last = self.region_decoder.last_maps(state[0], maps)
+            firsts.append((state[0], last))
+            regions.append(self.region_decoder.draw(last))
             if with_images:
                 images.append(self.image_decoder(state[0], maps)[:, 0])
-        return Foresight(torch.stack(operators, 1), torch.stack(regions, 1), torch.stack(images, 1) if images else None)
+        drawn = torch.stack(images, 1) if images else None
+        return Foresight(torch.stack(operators, 1), torch.stack(regions, 1), drawn, *firsts[0])
+
+    def choose(self, said: Foresight, candidates: Candidates) -> Tensor:
+        """How promising each legal action is (B, A), from stage 1: `choice_logits`, corrected by the judge if any."""
+        logits = self.choice_logits(
+            said.operators[:, 0], said.regions[:, 0], candidates.points, candidates.classes, candidates.log_residual
+        )
+        if self.judge is not None:
+            logits = logits + self.judge(said.maps.float(), said.feature.float(), candidates)
+        return logits
 
     def choice_logits(
         self, operators: Tensor, regions: Tensor, points: Tensor, classes: Tensor, log_residual: Tensor
@@ -92,10 +160,20 @@ class NfapLabels:
     regions: Tensor  # (B, n, S, S)
     operators: Tensor  # (B, n) classes
     first: Tensor  # (B, K) probabilities of the operator classes at stage 1
-    points: Tensor  # (B, A, P, 2)
-    classes: Tensor  # (B, A), -1 is padding
-    log_residual: Tensor  # (B, A)
+    candidates: Candidates
     policy: Tensor  # (B, A) probabilities of the actions at stage 1; all 0 where it is right to stop
+
+    @classmethod
+    def of(cls, batch: Mapping[str, Tensor]) -> "NfapLabels":
+        """From the arrays of `training.samples.nfap_sample`."""
+        candidates = candidates_of(batch)
+        own = {name: batch[name] for name in cls.__dataclass_fields__ if name != "candidates"}
+        return cls(candidates=candidates, **own)
+
+
+def candidates_of(batch: Mapping[str, Tensor]) -> Candidates:
+    """The legal actions among a batch's arrays."""
+    return Candidates(**{name: batch[name] for name in Candidates.__dataclass_fields__})
 
 
 def loss_terms(net: NfapNet, said: Foresight, truth: NfapLabels) -> dict[str, Tensor]:
@@ -116,10 +194,7 @@ def loss_terms(net: NfapNet, said: Foresight, truth: NfapLabels) -> dict[str, Te
         else 0.0
     )
     first = -(truth.first * said.operators[:, 0].float().log_softmax(-1)).sum(-1).mean()
-    logits = net.choice_logits(
-        said.operators[:, 0], said.regions[:, 0], truth.points, truth.classes, truth.log_residual
-    )
-    log_choice = logits.log_softmax(-1).masked_fill(truth.classes < 0, 0.0)
+    log_choice = net.choose(said, truth.candidates).log_softmax(-1).masked_fill(truth.candidates.classes < 0, 0.0)
     return {
         "image": n * functional.mse_loss(said.images.float().sigmoid(), truth.images),
         "operator": first + (n - 1) * later,
