@@ -1,4 +1,4 @@
-"""How good the search is, in five measurements: `python -m benchmarks.search COMMAND`."""
+"""How good the search is, in six measurements: `python -m benchmarks.search COMMAND`."""
 
 import os
 import platform
@@ -20,7 +20,7 @@ from autopoly_env.image_files import find_images
 from benchmarks import report, search_rows
 from benchmarks.curve_picture import draw_curves
 from benchmarks.report import Row
-from benchmarks.search_cases import Case, Records, Results
+from benchmarks.search_cases import Case, Records, Results, made
 
 HELP = """Measure the tree search. Each command prints one table.
 
@@ -176,6 +176,28 @@ def dominance(
     bench.show(f"r_all of mcts in {seconds:g} s a shape, shape by shape", rows)
 
 
+@app.command()
+def learning(
+    folder: Annotated[Path | None, typer.Argument(metavar="FOLDER", help="Silhouettes, beside what is made.")] = None,
+    made_each: Annotated[int, typer.Option(min=1, help="Constructions, and as many objects.")] = 48,
+    w_sc: Annotated[float, typer.Option(min=0.0, help="Price of an element.")] = 0.3,
+    budgets: Annotated[str, typer.Option(help="Refits, separated by commas.")] = "50,100,200,400",
+    seconds: Annotated[str, typer.Option(help="Seconds, separated by commas.", show_default="none")] = "",
+    limit: Limit = None,
+    workers: Workers = 1,
+    records: Kept = _RECORDS,
+    fresh: Fresh = False,
+) -> None:
+    """What nFAP-Net and WarpNet add to the search, at equal budgets."""
+    sets = {"constructions": made("construction", made_each), "objects": made("objects", made_each)}
+    if folder is not None:
+        sets[folder.name] = _targets(folder, limit)
+    bench = _Bench(records, workers, fresh)
+    complete = bench.completer("learning")
+    rows = search_rows.learning_rows(complete, sets, w_sc, _numbers(budgets), _times(seconds))
+    bench.show(f"mean r_all with and without networks, w_sc {w_sc:g}", rows)
+
+
 def _targets(folder: Path, limit: int | None) -> list[str]:
     try:
         return [str(image) for image in find_images([folder])[:limit]]
@@ -188,6 +210,16 @@ def _numbers(given: str) -> list[int]:
     if not all(part.isdecimal() and int(part) > 0 for part in numbers):
         raise ConfigError(f"--budgets {given}: expected numbers of refits, such as 50,100,400")
     return sorted({int(part) for part in numbers})
+
+
+def _times(given: str) -> list[float]:
+    try:
+        times = sorted({float(part) for part in given.split(",") if part.strip()})
+    except ValueError:
+        times = [-1.0]
+    if not all(0.0 < time < float("inf") for time in times):
+        raise ConfigError(f"--seconds {given}: expected numbers above 0, such as 0.2,1,5")
+    return times
 
 
 def main(arguments: list[str] | None = None) -> int:

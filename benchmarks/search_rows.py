@@ -43,6 +43,22 @@ VARIANTS: dict[str, tuple[Any, ...]] = {
     "hop_patience": (0, 60, 1000),
 }
 
+_TREE_ALONE = {"seeds": [], "hop_patience": 0}
+LEARNERS: dict[str, tuple[str, dict[str, Any]]] = {  # agents and options
+    "mcts, tree alone": ("mcts", _TREE_ALONE),
+    "nfap-prior, tree alone": ("nfap-prior", _TREE_ALONE),
+    "nfap-mcts": ("nfap-mcts", {}),
+    "mcts": ("mcts", {}),
+    "nfap-prior": ("nfap-prior", {}),
+}
+_PLAIN_OF = {  # whom each of them is held to
+    "mcts, tree alone": None,
+    "nfap-prior, tree alone": "mcts, tree alone",
+    "nfap-mcts": "mcts, tree alone",
+    "mcts": None,
+    "nfap-prior": "mcts",
+}
+
 Complete = Callable[[Iterable[Case]], Results]  # gets results for cases; those that failed are left out
 OnDone = Callable[[Case, str], None]  # told of each case that is over, and what was wrong with it
 Totals = dict[tuple[str, float, int], Interval]  # (agent, w_sc, refits) -> mean r_all
@@ -152,6 +168,32 @@ def dominance_rows(complete: Complete, targets: Sequence[str], seconds: float) -
                     n_lost += 1
                     yield Row(f"  lower on {target}", found[target], theirs[target])
     yield Row(f"shapes lower by more than {LOWER:g}", float(n_lost), must=NONE_LOST, note="of all the above")
+
+
+def learning_rows(
+    complete: Complete, sets: dict[str, list[str]], w_sc: float, refits: Sequence[int], seconds: Sequence[float]
+) -> Iterator[Row]:
+    """What the networks add at equal budgets, for each set of targets; `mcts` without them is what they are held to."""
+    budgets: list[dict[str, Any]] = [*({"refits": n} for n in refits), *({"seconds": n} for n in seconds)]
+    keys = [(name, n, who) for name in sets for n in range(len(budgets)) for who in LEARNERS]
+    cases = {
+        (name, n, who): [
+            with_options(Case(target, LEARNERS[who][0], w_sc, **budgets[n]), **LEARNERS[who][1])
+            for target in sets[name]
+        ]
+        for name, n, who in keys
+    }
+    results = complete(case for those in cases.values() for case in those)
+    for name in sets:
+        for n, budget in enumerate(budgets):
+            [(unit, amount)] = budget.items()
+            found = {who: _totals(cases[name, n, who], results) for who in LEARNERS}
+            for who, plain in _PLAIN_OF.items():
+                label = f"{name}, {amount:g} {unit}: {who}"
+                if plain is None:
+                    yield Row(label, _mean(found[who].values()), note=f"mean r_all, {len(found[who])} shapes")
+                else:
+                    yield _against(label, found[who], found[plain])
 
 
 def _totals(cases: Sequence[Case], results: Results) -> dict[str, float]:

@@ -78,6 +78,7 @@ class WarpConfig:
     grid: int = 6  # M
     deformation: Literal["global", "local"] = "global"  # from the feature alone, or from feature maps around each point
     passes: int = 1  # warps in a row, each of what the one before it has made
+    vertices: bool = False  # a third channel shows where the vertices of the boundary are
     feature: int = 128
     widths: tuple[int, int, int, int] = (16, 32, 48, 64)
 
@@ -91,10 +92,15 @@ class WarpConfig:
 
 @dataclass(frozen=True)
 class NfapPriorConfig(MctsConfig):
-    """`nfap-prior`: the search with nFAP-Net's priors and exact refits."""
+    """`nfap-prior`: the search with nFAP-Net's priors and exact refits.
 
-    seeds: tuple[str, ...] = ()
-    hop_patience: int = 0
+    A good prior is best trusted: children are made one by one, and a step is committed soon.
+    """
+
+    seeds: tuple[str, ...] = ("trace",)
+    n_simulations: int = 4
+    n_expanded: int = 1
+    tree_share: float = 0.5
     prior: Literal["nfap"] = "nfap"  # type: ignore[assignment]
     nfap_weights: str = ""  # a .safetensors file; empty for the one that comes with the project
     n: int = 3  # stages that the weights must have been trained with
@@ -110,6 +116,10 @@ class NfapPriorConfig(MctsConfig):
 class NfapMctsConfig(NfapPriorConfig):
     """`nfap-mcts`: the paper's Algorithm 1, refits only where a step is committed."""
 
+    seeds: tuple[str, ...] = ()
+    n_simulations: int = 16
+    n_expanded: int = 4
+    hop_patience: int = 0
     n_rollout: int = 2
     warpnet_weights: str = ""  # as nfap_weights
     start: Literal["placed", "plain"] = "placed"  # new vertices begin at the disagreement, or where the operator puts

@@ -26,6 +26,7 @@ class MctsConfig:
     reuse_tree: bool = True  # keep what is below the child that is taken
     merge: bool = True  # do not go on from a shape that the tree has already
     patience: int = 4  # committed steps in a row that may fail to improve the best shape
+    tree_share: float = 0.25  # of what the seeds leave of the budget, that a tree may use at most where hops follow
     hop_patience: int = 60  # hops in a row, from outline to outline, that may; 0: the search ends with the tree
     n_refits: int = 1500  # where the budget sets no limit
     seed: int = 0
@@ -36,6 +37,8 @@ class MctsConfig:
         for name, bound in least.items():
             if not getattr(self, name) >= bound:
                 raise ConfigError(f"{name} = {getattr(self, name)}: expected at least {bound}")
+        if not 0.0 <= self.tree_share <= 1.0:
+            raise ConfigError(f"tree_share = {self.tree_share}: expected a share, 0 to 1")
         if not 0.0 <= self.widening <= 1.0:
             raise ConfigError(f"widening = {self.widening}: expected an exponent, 0 to 1")
         if not 0.0 < self.discount <= 1.0:

@@ -21,7 +21,6 @@ from agents.search.tree import Node
 from autopoly_env.actions import STOP
 from autopoly_env.simulator import Simulator, State
 
-_TREE_SHARE = 0.25  # of what is left of the budget, that a tree may use where the search goes on among outlines
 _EVALUATORS: dict[str, type[UniformEvaluator]] = {"residual": ResidualEvaluator, "uniform": UniformEvaluator}
 
 
@@ -77,7 +76,7 @@ class MctsAgent(Agent):
             finds.incumbents.append(solution)
             finds.offer(track_of(simulator, solution.sequence))
         for start in [initial] if finds.best is initial else [finds.best, initial]:
-            part = meter.part(1.0 if finds.tops is None else _TREE_SHARE)
+            part = meter.part(1.0 if finds.tops is None else self._config.tree_share)
             for track in self._search(simulator, start, part):
                 finds.offer(track)
         if finds.tops is not None:
