@@ -78,7 +78,6 @@ class WarpConfig:
     grid: int = 6  # M
     deformation: Literal["global", "local"] = "global"  # from the feature alone, or from feature maps around each point
     passes: int = 1  # warps in a row, each of what the one before it has made
-    vertices: bool = False  # a third channel shows where the vertices of the boundary are
     feature: int = 128
     widths: tuple[int, int, int, int] = (16, 32, 48, 64)
 

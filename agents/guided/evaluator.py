@@ -152,7 +152,7 @@ class WarpEvaluator(NfapEvaluator):
         pictures = np.stack([np.stack((rendering(mesh, size), target)) for mesh in meshes])
         vertices = _padded([mesh.vertices.astype(np.float32) for mesh in meshes], 0)
         edges = _padded([mesh.topology.boundary_half_edges for mesh in meshes], -1)
-        with torch.inference_mode():
+        with torch.no_grad():
             carried = self._warp.warps(torch.from_numpy(pictures), vertices, edges)[-1].vertices.double().numpy()
         return [mesh.with_vertices(row[: len(mesh.vertices)]) for row, mesh in zip(carried, meshes, strict=True)]
 

@@ -42,7 +42,7 @@ class WarpNet(nn.Module):
         super().__init__()
         self.config = config
         local, n_points = config.deformation == "local", config.grid**2
-        self.encoder = Encoder(self.n_inputs, config.widths, config.feature, config.image_size)
+        self.encoder = Encoder(2, config.widths, config.feature, config.image_size)
         self.head = nn.Linear(config.feature, 6 if local else 6 + 2 * n_points)
         self.field = _Field(config) if local else None
         nn.init.zeros_(self.head.weight)
@@ -50,13 +50,8 @@ class WarpNet(nn.Module):
         self.register_buffer("rest", control_grid(config.grid), persistent=False)
         self.register_buffer("identity", torch.tensor([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), persistent=False)
 
-    @property
-    def n_inputs(self) -> int:
-        """Channels C of the pictures."""
-        return 3 if self.config.vertices else 2
-
     def forward(self, pictures: Tensor) -> Theta:
-        """Theta for pictures (B, C, S, S): the rendering I_k, the target I_T, if wanted the vertices."""
+        """Theta for pictures (B, 2, S, S): the rendering I_k and the target I_T."""
         feature, maps = self.encoder(pictures)
         raw = self.head(feature).float()
         bent = raw[:, 6:].unflatten(1, (-1, 2)) if self.field is None else self.field(feature, maps, self.rest).float()
@@ -81,24 +76,13 @@ class WarpNet(nn.Module):
         made: list[Warp] = []
         goal = pictures[:, 1]
         for _ in range(self.config.passes):
-            points = [_splat(vertices, edges, self.config.image_size)] if self.config.vertices else []
-            theta = (think or self)(torch.cat((pictures, *points), 1))
+            theta = (think or self)(pictures)
             carried = self.carry(self.goals(theta), vertices)
             shown = coverage(carried, edges, self.config.image_size)
             made.append(Warp(pictures, theta, carried, shown))
             vertices = carried.detach()
             pictures = torch.stack((shown.detach().clamp(0.0, 1.0).to(goal), goal), 1)
         return made
-
-
-def _splat(vertices: Tensor, edges: Tensor, size: int) -> Tensor:
-    """(B, 1, S, S) 1 in the pixels that hold a vertex of the boundary."""
-    ends = edges[..., 0].clamp(min=0)
-    at = (vertices.gather(1, ends[..., None].expand(-1, -1, 2)) * size).floor().long()  # (B, E, 2)
-    shown = (edges[..., 0] >= 0) & (at >= 0).all(-1) & (at < size).all(-1)
-    pixels = (at[..., 1] * size + at[..., 0]).clamp(0, size * size - 1)
-    picture = vertices.new_zeros(len(vertices), size * size)
-    return picture.scatter_reduce(1, pixels, shown.to(picture.dtype), "amax").unflatten(1, (1, size, size))
 
 
 class _Field(nn.Module):
