@@ -46,6 +46,7 @@ VARIANTS: dict[str, tuple[Any, ...]] = {
 _TREE_ALONE = {"seeds": [], "hop_patience": 0}
 LEARNERS: dict[str, tuple[str, dict[str, Any]]] = {  # agents and options
     "mcts, tree alone": ("mcts", _TREE_ALONE),
+    "mcts, tree alone, one by one": ("mcts", _TREE_ALONE | {"n_expanded": 1, "n_simulations": 4}),
     "nfap-prior, tree alone": ("nfap-prior", _TREE_ALONE),
     "nfap-mcts": ("nfap-mcts", {}),
     "mcts": ("mcts", {}),
@@ -53,7 +54,8 @@ LEARNERS: dict[str, tuple[str, dict[str, Any]]] = {  # agents and options
 }
 _PLAIN_OF = {  # whom each of them is held to
     "mcts, tree alone": None,
-    "nfap-prior, tree alone": "mcts, tree alone",
+    "mcts, tree alone, one by one": "mcts, tree alone",
+    "nfap-prior, tree alone": "mcts, tree alone, one by one",
     "nfap-mcts": "mcts, tree alone",
     "mcts": None,
     "nfap-prior": "mcts",
@@ -175,7 +177,14 @@ def learning_rows(
 ) -> Iterator[Row]:
     """What the networks add at equal budgets, for each set of targets; `mcts` without them is what they are held to."""
     budgets: list[dict[str, Any]] = [*({"refits": n} for n in refits), *({"seconds": n} for n in seconds)]
-    keys = [(name, n, who) for name in sets for n in range(len(budgets)) for who in LEARNERS]
+    last = len(refits) - 1
+    keys = [
+        (name, n, who)
+        for name in sets
+        for n in range(len(budgets))
+        for who in LEARNERS
+        if n == last or LEARNERS[who][0] != "nfap-mcts"  # which takes a refit a step and ends by itself
+    ]
     cases = {
         (name, n, who): [
             with_options(Case(target, LEARNERS[who][0], w_sc, **budgets[n]), **LEARNERS[who][1])
@@ -187,8 +196,8 @@ def learning_rows(
     for name in sets:
         for n, budget in enumerate(budgets):
             [(unit, amount)] = budget.items()
-            found = {who: _totals(cases[name, n, who], results) for who in LEARNERS}
-            for who, plain in _PLAIN_OF.items():
+            found = {who: _totals(cases[name, n, who], results) for who in LEARNERS if (name, n, who) in cases}
+            for who, plain in ((who, plain) for who, plain in _PLAIN_OF.items() if who in found):
                 label = f"{name}, {amount:g} {unit}: {who}"
                 if plain is None:
                     yield Row(label, _mean(found[who].values()), note=f"mean r_all, {len(found[who])} shapes")
