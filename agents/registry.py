@@ -1,6 +1,7 @@
 """Agents by name: `make_agent("beam", width=4)`."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from agents.base import Agent
@@ -13,6 +14,8 @@ from agents.guided.config import NfapMctsConfig, NfapPriorConfig
 from agents.options import validated
 from agents.oracle import OracleAgent, OracleConfig
 from agents.random_agent import RandomAgent, RandomConfig
+from agents.rl.agent import rl_agent, rl_prior
+from agents.rl.config import RlConfig, RlPriorConfig
 from agents.search.config import PAPER, MctsConfig
 from agents.search.mcts import MctsAgent, PaperMctsAgent
 from agents.trace.agent import TraceAgent, TraceConfig
@@ -35,6 +38,10 @@ def _nfap_prior(config: NfapPriorConfig) -> Agent:
     return nfap_prior(config, [make_agent(name) for name in config.seeds])
 
 
+def _rl_prior(config: RlPriorConfig) -> Agent:
+    return rl_prior(config, [make_agent(name) for name in config.seeds])
+
+
 AGENTS: dict[str, tuple[Callable[[Any], Agent], Any]] = {
     "random": (RandomAgent, RandomConfig()),
     "greedy": (_Greedy, BeamConfig(width=1)),
@@ -46,6 +53,11 @@ AGENTS: dict[str, tuple[Callable[[Any], Agent], Any]] = {
     "mcts_paper": (_mcts_paper, PAPER),
     "nfap-prior": (_nfap_prior, NfapPriorConfig()),
     "nfap-mcts": (nfap_mcts, NfapMctsConfig()),
+    "ppo": (partial(rl_agent, "ppo"), RlConfig()),
+    "maskable-ppo": (partial(rl_agent, "maskable-ppo"), RlConfig()),
+    "a2c": (partial(rl_agent, "a2c"), RlConfig()),
+    "dqn": (partial(rl_agent, "dqn"), RlConfig()),
+    "rl-prior": (_rl_prior, RlPriorConfig()),
     "oracle": (OracleAgent, OracleConfig()),
     "dr-simple": (dr_simple, DrSimpleConfig()),
     "dr-complex": (dr_complex, DrComplexConfig()),

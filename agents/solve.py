@@ -61,8 +61,8 @@ def solve(
     agent: Annotated[
         str,
         typer.Option(
-            help="Who builds: climb, trace, mcts, mcts_paper, nfap-prior, nfap-mcts, decimate, beam, greedy, random, "
-            "oracle, dr-simple or dr-complex."
+            help="Who builds: climb, trace, mcts, mcts_paper, nfap-prior, nfap-mcts, maskable-ppo, ppo, a2c, dqn, "
+            "rl-prior, decimate, beam, greedy, random, oracle, dr-simple or dr-complex."
         ),
     ] = DEFAULT_AGENT,
     operators: Annotated[str, typer.Option(help="paper, full, or operators, separated by commas.")] = "full",

@@ -1,0 +1,1 @@
+"""Reinforcement learning: a network that reads meshes, the algorithms that train it, and the agents it makes."""

@@ -1,0 +1,81 @@
+"""`ppo`, `maskable-ppo`, `a2c`, `dqn`: trained policies as agents; `rl-prior`: the tree search with one as prior."""
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from agents.base import Agent, Decision, Meter, Track
+from agents.extras import require
+from agents.rl.config import RlConfig, RlPriorConfig
+from agents.search.mcts import MctsAgent
+from autopoly_env.actions import STOP
+from autopoly_env.parallel import n_threads
+from autopoly_env.simulator import Simulator, State
+
+if TYPE_CHECKING:
+    from agents.rl.player import Player
+
+PRIOR = "maskable-ppo"  # whose weights `rl-prior` takes
+
+
+class RlAgent(Agent):
+    """Plays what a policy says, once or `k` times, of which the best counts. A budget may end it earlier."""
+
+    def __init__(self, name: str, config: RlConfig, player: "Player") -> None:
+        self.name = name
+        self._config, self._player = config, player
+
+    def act(self, simulator: Simulator, state: State) -> Decision:
+        """The likeliest action, or one that is drawn."""
+        config = self._config
+        action = self._player.ranked(simulator, state, self._rng(0, state.step), config.temperature)[0]
+        if state.step >= self._player.rules.max_steps:
+            return Decision(STOP)
+        return Decision(action, self._player.probabilities(simulator, state, config.temperature))
+
+    def _search(self, simulator: Simulator, track: Track, meter: Meter) -> Iterator[Track]:
+        """All plays, one after the other, each from `track` on."""
+        for number in range(self._config.k):
+            if meter.spent():
+                return
+            rng = self._rng(number, track.state.step)
+            yield from self._player.play(simulator, track, meter, rng, self._config.temperature)
+
+    def _rng(self, number: int, step: int) -> np.random.Generator | None:
+        """What the play of this number is drawn with from a step on; None where it takes what is likeliest."""
+        if self._config.play == "greedy" and number == 0:
+            return None
+        return np.random.default_rng((self._config.seed, number, step))
+
+
+class RlPriorAgent(MctsAgent):
+    """Tree search with a policy's priors and exact refits."""
+
+    name = "rl-prior"
+
+
+def rl_agent(name: str, config: RlConfig) -> Agent:
+    """The agent of a config. Raises ConfigError if its weights are missing or damaged."""
+    return RlAgent(name, config, _player(name, name, config.weights))
+
+
+def rl_prior(config: RlPriorConfig, incumbents: Sequence[Agent] = ()) -> Agent:
+    """The agent of a config; `incumbents` are the agents that it names as seeds. Raises ConfigError as `rl_agent`."""
+    player = _player("rl-prior", PRIOR, config.weights)
+    from agents.rl.evaluator import RlEvaluator
+
+    return RlPriorAgent(config, incumbents, RlEvaluator(player, config.temperature))
+
+
+def _player(who: str, whose: str, weights: str) -> "Player":
+    """The policy in a file, or that of the agent `whose`. Keeps torch to this process's threads."""
+    require("learn", f"agent {who!r}", "safetensors", "torch")
+    import torch
+
+    from agents.rl.player import Player
+    from agents.rl.weights import file_of, load_policy
+
+    torch.set_num_threads(n_threads())
+    net, _ = load_policy(file_of(whose, weights))
+    return Player(net, who)

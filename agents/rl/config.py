@@ -1,0 +1,101 @@
+"""What the policy network and the agents that use it can be told; nothing here needs torch.
+
+Letters: N `max_vertices`, R pixels a side of the observed pictures.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from agents.search.config import MctsConfig
+from autopoly_env.errors import ConfigError
+from autopoly_env.operators import preset
+
+ALGORITHMS = ("maskable_ppo", "ppo", "a2c", "dqn")
+
+
+@dataclass(frozen=True)
+class NetConfig:
+    """The network. Widths are numbers of channels."""
+
+    widths: tuple[int, int, int] = (24, 32, 48)  # of the feature maps at R/4, R/8, R/16
+    width: int = 64  # of what is known of a half-edge, and of the whole
+    n_rounds: int = 2  # of messages between neighbouring half-edges
+
+    def __post_init__(self) -> None:
+        if min(*self.widths, self.width) < 4 or not 0 <= self.n_rounds <= 8:
+            raise ConfigError(f"{self}: expected widths of at least 4 and 0 to 8 rounds")
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What a policy was made for: where it plays these must be the same."""
+
+    operators: tuple[str, ...] = tuple(operator.name for operator in preset("full"))
+    max_vertices: int = 48  # N
+    obs_resolution: int = 64  # R
+    max_steps: int = 24  # of a construction; after them it stops
+
+    def __post_init__(self) -> None:
+        preset(",".join(self.operators))
+        if self.max_vertices < 4 or self.max_steps < 1:
+            raise ConfigError(f"{self}: expected max_vertices of at least 4 and max_steps of at least 1")
+        if self.obs_resolution % 16 or not 16 <= self.obs_resolution <= 256:
+            raise ConfigError(
+                f"obs_resolution {self.obs_resolution}: expected a multiple of 16, 16 to 256 pixels a side"
+            )
+
+    def check_same(self, other: "Rules", ours: str, theirs: str) -> None:
+        """Raise ConfigError, which names both settings, unless `other`, of `theirs`, is what these, of `ours`, are."""
+        for name, value in vars(self).items():
+            found = getattr(other, name)
+            if found != value:
+                raise ConfigError(f"{theirs}: {name} {_shown(found)}; {ours}: {name} {_shown(value)}: make them agree")
+
+    def check_operators(self, operators: tuple[str, ...], who: str) -> None:
+        """Raise ConfigError, which names both, unless these are the operators of the policy, in any order."""
+        if set(operators) != set(self.operators):
+            raise ConfigError(
+                f"{who} was trained with operators {_shown(self.operators)} and is asked to play with "
+                f"{_shown(operators)}: give operators={_shown(self.operators)} or other weights"
+            )
+
+
+def _shown(value: Any) -> str:
+    if not isinstance(value, tuple):
+        return str(value)
+    known = {preset_name: tuple(o.name for o in preset(preset_name)) for preset_name in ("paper", "full")}
+    named = [name for name, operators in known.items() if set(operators) == set(value)]
+    return named[0] if named else ",".join(map(str, value))
+
+
+@dataclass(frozen=True)
+class RlConfig:
+    """How `ppo`, `maskable-ppo`, `a2c` and `dqn` play."""
+
+    weights: str = ""  # a .safetensors file; empty for the one that comes with the project, where one does
+    play: Literal["greedy", "sampled"] = "greedy"  # the likeliest action, or one drawn
+    k: int = 1  # constructions, of which the best counts; from the second on they are sampled
+    temperature: float = 1.0  # of sampling: below 1 it keeps to what is likely
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.k < 1 or self.seed < 0:
+            raise ConfigError(f"{self}: expected k of at least 1 and a seed of at least 0")
+        if not self.temperature > 0.0:
+            raise ConfigError(f"temperature = {self.temperature}: expected a number above 0")
+
+
+@dataclass(frozen=True)
+class RlPriorConfig(MctsConfig):
+    """`rl-prior`: the search with the policy's probabilities as priors, and exact refits."""
+
+    seeds: tuple[str, ...] = ()
+    hop_patience: int = 0
+    prior: Literal["rl"] = "rl"  # type: ignore[assignment]
+    weights: str = ""  # a .safetensors file; empty for that of `maskable-ppo`
+    temperature: float = 1.0  # of the prior: above 1 it is flatter
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.temperature > 0.0:
+            raise ConfigError(f"temperature = {self.temperature}: expected a number above 0")

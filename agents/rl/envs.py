@@ -1,0 +1,250 @@
+"""Environments as the algorithms see them: with the action mask and the price of an element in the observation.
+
+The number of steps that are left is part of the observation, so an episode that `max_steps` ends has simply ended: its
+last state is worth nothing more, and nothing is bootstrapped.
+"""
+
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, cast
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from stable_baselines3.common.vec_env import SubprocVecEnv, VecEnv
+
+from agents.rl.config import Rules
+from agents.rl.player import observation_of
+from autopoly_env.env import AutoPolyEnv, EnvState
+from autopoly_env.errors import ConfigError
+from autopoly_env.observation import Observation
+from autopoly_env.parallel import set_threads
+from autopoly_env.routines import Routine, run, run_all
+from autopoly_env.silhouette import Silhouette
+from autopoly_env.targets import ConstructionTargets, TargetSource, make_targets
+
+N_SEEDS = 2**30  # targets to learn from; those from here on are held out, as `training.make_expert` has it
+_HIGHEST_PRICE = 1e6
+
+
+@dataclass(frozen=True)
+class _Learned:
+    """A source whose held-out targets never come up."""
+
+    source: TargetSource
+
+    @property
+    def name(self) -> str:
+        return self.source.name
+
+    def sample(self, seed: int) -> Silhouette:
+        return self.source.sample(seed % N_SEEDS)
+
+
+@dataclass(frozen=True)
+class Course:
+    """What is built in an environment, and for which price."""
+
+    targets: str = "construction"  # "construction", "objects" or a folder of images
+    w_sc: float = 1.0  # price of an element, in points of r_all
+    difficulty: tuple[int, int] = (1, 5)  # of constructions: how many actions change the outline
+    operators: str = "paper"  # of constructions
+
+    def source(self, difficulty: tuple[int, int] | None = None) -> TargetSource:
+        """The targets. Raises ConfigError."""
+        if self.targets == "construction":
+            return ConstructionTargets(difficulty or self.difficulty, self.operators)
+        return make_targets(self.targets)
+
+
+@dataclass(frozen=True)
+class Table:
+    """What all environments of a training have in common."""
+
+    rules: Rules
+    resolution: int = 64  # pixels a side at which meshes are fitted and scored
+    reward_scale: float = 0.1  # reward of a point of r_all
+    illegal_penalty: float = 1.0  # points of r_all
+    n_plays: int = 1  # episodes with a target before the next one comes, which takes longer than a step
+
+    def make(self, course: Course) -> "Practice":
+        """An environment. Raises ConfigError."""
+        rules = self.rules
+        env = AutoPolyEnv(
+            targets=_Learned(course.source()),
+            operators=",".join(rules.operators),
+            resolution=self.resolution,
+            obs_resolution=rules.obs_resolution,
+            max_steps=rules.max_steps,
+            max_vertices=rules.max_vertices,
+            match_threshold=1.0,
+            reward_mode="improvement",
+            illegal_penalty=self.illegal_penalty,
+            w_sc=course.w_sc,
+        )
+        return Practice(env, course, self.reward_scale, self.n_plays)
+
+
+class Practice(gymnasium.Wrapper[Observation, Any, Observation, Any]):
+    """An environment to learn in; see the module. `info["episode"]` at an end is what SB3's Monitor would say."""
+
+    def __init__(self, env: AutoPolyEnv, course: Course, reward_scale: float, n_plays: int = 1) -> None:
+        super().__init__(env)
+        self._inner, self._course, self._reward_scale = env, course, reward_scale
+        boxes = dict(env.observation_space.spaces)  # type: ignore[attr-defined]
+        more: dict[str, gymnasium.Space[Any]] = {
+            "action_mask": spaces.Box(0, 1, (env.codec.n_actions,), np.int8),
+            "price": spaces.Box(0.0, _HIGHEST_PRICE, (1,), np.float32),
+        }
+        self.observation_space = cast(gymnasium.Space[Observation], spaces.Dict({**boxes, **more}))
+        self._return = 0.0
+        self._n_plays, self._n_played = n_plays, 0
+        self._first: EnvState | None = None  # of this target
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        if seed is not None:
+            self.seed(seed)
+        return run(self.reset_routine(options))
+
+    def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        return run(self.step_routine(action))
+
+    def reset_routine(self, options: dict[str, Any] | None = None) -> Routine[tuple[Observation, dict[str, Any]]]:
+        """As that of `AutoPolyEnv`; without options the same target again, until it has had its plays."""
+        if not options and self._first is not None and self._n_played < self._n_plays:
+            options = {"state": self._first}
+        else:
+            self._n_played = 0
+        observation, info = yield from self._inner.reset_routine(options)
+        self._first = self._inner.clone_state()
+        self._return, self._n_played = 0.0, self._n_played + 1
+        return self._seen(observation, info), info
+
+    def step_routine(self, action: Any) -> Routine[tuple[Observation, float, bool, bool, dict[str, Any]]]:
+        """As that of `AutoPolyEnv`."""
+        observation, points, terminated, truncated, info = yield from self._inner.step_routine(action)
+        reward = self._reward_scale * points
+        self._return += reward
+        if terminated or truncated:
+            length = self._inner.state.step + (info["ended_by"] == "stop")
+            info["episode"] = {"r": self._return, "l": length, "t": 0.0}
+        return self._seen(observation, info), reward, terminated or truncated, False, info
+
+    def seed(self, seed: int) -> None:
+        """Draw the next targets from this seed on."""
+        gymnasium.Env.reset(self._inner, seed=seed)
+        self._first = None
+
+    def action_masks(self) -> np.ndarray[Any, Any]:
+        """(n_actions,) bool, which actions are legal now."""
+        return self._inner.action_masks()
+
+    def set_difficulty(self, most: int) -> None:
+        """Draw constructions of at most this difficulty from now on."""
+        if self._course.targets == "construction":
+            low, high = self._course.difficulty
+            self._inner.targets = _Learned(self._course.source((min(low, most), min(high, most))))
+
+    def _seen(self, observation: Observation, info: dict[str, Any]) -> Observation:
+        return observation_of(observation, info["action_mask"].astype(np.bool_), self._course.w_sc)
+
+
+class NativeVecEnv(VecEnv):
+    """Many environments in one process that step at the same time, on all its threads, as `AutoPolyVectorEnv` does.
+
+    `seconds` is the time spent in them.
+    """
+
+    def __init__(self, envs: Sequence[Practice]) -> None:
+        self.envs = list(envs)
+        self.seconds = 0.0
+        self._actions: list[int] = []
+        super().__init__(len(self.envs), self.envs[0].observation_space, self.envs[0].action_space)
+
+    def reset(self) -> dict[str, np.ndarray[Any, Any]]:
+        began = time.perf_counter()
+        for env, seed in zip(self.envs, self._seeds, strict=True):
+            if seed is not None:
+                env.seed(seed)
+        starts = run_all(env.reset_routine() for env in self.envs)
+        self.reset_infos = [info for _, info in starts]
+        self._reset_seeds()
+        self._reset_options()
+        self.seconds += time.perf_counter() - began
+        return _stacked([observation for observation, _ in starts])
+
+    def step_async(self, actions: np.ndarray[Any, Any]) -> None:
+        self._actions = [int(action) for action in actions]
+
+    def step_wait(self) -> tuple[Any, np.ndarray[Any, Any], np.ndarray[Any, Any], list[dict[str, Any]]]:
+        began = time.perf_counter()
+        stepped = run_all(_step(env, action) for env, action in zip(self.envs, self._actions, strict=True))
+        observations, rewards, dones, infos = zip(*stepped, strict=True)
+        self.seconds += time.perf_counter() - began
+        return _stacked(observations), np.array(rewards, np.float32), np.array(dones), list(infos)
+
+    def close(self) -> None:
+        pass
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        return [env.get_wrapper_attr(attr_name) for env in self._some(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        for env in self._some(indices):
+            setattr(env, attr_name, value)
+
+    def env_method(self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any) -> list[Any]:
+        return [getattr(env, method_name)(*method_args, **method_kwargs) for env in self._some(indices)]
+
+    def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
+        return [isinstance(env, wrapper_class) for env in self._some(indices)]
+
+    def _some(self, indices: Any) -> list[Practice]:
+        return [self.envs[k] for k in self._get_indices(indices)]
+
+
+def make_vec_env(table: Table, courses: Sequence[Course], n_envs: int, kind: str, seed: int) -> VecEnv:
+    """`n_envs` environments that take the courses in turn; `kind` "native": one process, "subproc": one each.
+
+    Raises ConfigError for settings out of range.
+    """
+    if not courses or n_envs < len(courses):
+        raise ConfigError(f"{n_envs} environments for {len(courses)} courses: expected one course and n_envs as many")
+    chosen = [courses[k % len(courses)] for k in range(n_envs)]
+    envs: VecEnv
+    if kind == "native":
+        envs = NativeVecEnv([table.make(course) for course in chosen])
+    else:
+        table.make(chosen[0])  # what is wrong with the settings is said here
+        envs = SubprocVecEnv([_Worker(asdict(table), asdict(course)) for course in chosen], start_method="spawn")
+    envs.seed(seed)
+    return envs
+
+
+class _Worker:
+    """Makes an environment in a process of its own."""
+
+    def __init__(self, table: dict[str, Any], course: dict[str, Any]) -> None:
+        self._table, self._course = table, course
+
+    def __call__(self) -> gymnasium.Env[Any, Any]:
+        set_threads(1)
+        table = {**self._table, "rules": Rules(**self._table["rules"])}
+        return Table(**table).make(Course(**self._course))
+
+
+def _step(env: Practice, action: int) -> Routine[tuple[Observation, float, bool, dict[str, Any]]]:
+    """A step and, where it ends the episode, the reset."""
+    observation, reward, done, _, info = yield from env.step_routine(action)
+    if done:
+        info["terminal_observation"] = observation
+        info["TimeLimit.truncated"] = False
+        observation, _ = yield from env.reset_routine()
+    return observation, reward, done, info
+
+
+def _stacked(observations: Sequence[Observation]) -> dict[str, np.ndarray[Any, Any]]:
+    return {name: np.stack([observation[name] for observation in observations]) for name in observations[0]}

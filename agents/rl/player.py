@@ -1,0 +1,135 @@
+"""`Player`: a policy network at the simulator's table. It needs torch, and neither Gymnasium nor Stable-Baselines3.
+
+Letters: B states, G actions of the codec.
+"""
+
+from collections.abc import Iterator, Sequence
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import torch
+
+from agents.base import Meter, Track
+from agents.rl.network import MeshNet, observer_of
+from autopoly_env.actions import STOP, Action, ActionCodec
+from autopoly_env.arrays import BoolArray, ByteArray, FloatArray
+from autopoly_env.errors import IllegalActionError
+from autopoly_env.observation import Observation
+from autopoly_env.silhouette import Silhouette
+from autopoly_env.simulator import Simulator, State
+
+
+def observation_of(observation: Observation, mask: BoolArray, w_sc: float) -> Observation:
+    """What a policy sees: the environment's observation, which actions are legal, and what an element costs."""
+    return {**observation, "action_mask": mask.astype(np.int8), "price": np.array((w_sc,), np.float32)}
+
+
+class Player:
+    """Says how promising actions are. `who` is its name in errors."""
+
+    def __init__(self, net: MeshNet, who: str = "the policy") -> None:
+        self.net, self.who = net.eval(), who
+        self.rules = net.rules
+        self.codec = ActionCodec(self.rules.operators, self.rules.max_vertices)
+        self._observer = observer_of(self.rules)
+        self._pictures: WeakKeyDictionary[Silhouette, ByteArray] = WeakKeyDictionary()
+
+    def observe(self, simulator: Simulator, state: State) -> Observation:
+        """What the policy sees of a state.
+
+        Raises ConfigError for other operators than it was trained with, and for a mesh that its padding has no room
+        for.
+        """
+        self.rules.check_operators(simulator.operators, self.who)
+        self.check_fits(state)
+        silhouette = simulator.silhouette
+        if silhouette not in self._pictures:
+            self._pictures[silhouette] = self._observer.picture_of(silhouette)
+        left = max(0, min(self.rules.max_steps, simulator.max_steps) - state.step)
+        seen = self._observer.observe(state.mesh, self._pictures[silhouette], left)
+        return observation_of(seen, self.legal_mask(simulator, state), simulator.weights.w_sc)
+
+    def check_fits(self, state: State) -> None:
+        """Raise ConfigError for a mesh that the padding has no room for."""
+        self._observer.check_fits(state.mesh)
+
+    def legal_mask(self, simulator: Simulator, state: State) -> BoolArray:
+        """(G,) what may be done: what the codec has room for and the simulator, with its guidance, allows."""
+        mask = self.codec.legal_mask(state.mesh)
+        if simulator.guidance.names:
+            allowed = np.zeros_like(mask)
+            allowed[[0, *self._indices(simulator.legal_actions(state))]] = True
+            mask &= allowed
+        return mask
+
+    def logits(self, simulators: Sequence[Simulator], states: Sequence[State]) -> FloatArray:
+        """(B, G) logits of the actions in each state; far below all others where they are not legal."""
+        seen = [self.observe(simulator, state) for simulator, state in zip(simulators, states, strict=True)]
+        batch = {name: torch.from_numpy(np.stack([one[name] for one in seen])) for name in seen[0]}
+        device = next(self.net.parameters()).device
+        with torch.inference_mode():
+            said, _ = self.net({name: tensor.to(device) for name, tensor in batch.items()})
+        logits: FloatArray = said.double().cpu().numpy()
+        return logits
+
+    def ranked(
+        self, simulator: Simulator, state: State, rng: np.random.Generator | None = None, temperature: float = 1.0
+    ) -> list[Action]:
+        """The legal actions in the order in which to try them: the likeliest first, or drawn with `rng`.
+
+        STOP alone where the construction has as many steps as the policy was trained to take.
+        """
+        if state.step >= self.rules.max_steps:
+            return [STOP]
+        logits = self.logits([simulator], [state])[0]
+        legal = np.flatnonzero(self.legal_mask(simulator, state))
+        odds = logits[legal]
+        if rng is not None:
+            odds = odds / temperature + rng.gumbel(size=len(odds))  # whose order is that of drawing without returning
+        return [self.codec.decode(int(legal[k])) for k in np.argsort(-odds, kind="stable")]
+
+    def probabilities(self, simulator: Simulator, state: State, temperature: float = 1.0) -> dict[Action, float]:
+        """The probability of each legal action, STOP first."""
+        logits = self.logits([simulator], [state])[0]
+        legal = np.flatnonzero(self.legal_mask(simulator, state))
+        odds = np.exp((logits[legal] - logits[legal].max()) / temperature)
+        odds /= odds.sum()
+        return {self.codec.decode(int(k)): float(p) for k, p in zip(legal, odds, strict=True)}
+
+    def play(
+        self,
+        simulator: Simulator,
+        track: Track,
+        meter: Meter,
+        rng: np.random.Generator | None = None,
+        temperature: float = 1.0,
+    ) -> Iterator[Track]:
+        """Play on from `track` until the policy stops or the budget is spent; yield every step."""
+        while not track.state.done and not meter.spent():
+            following = self._step(simulator, track.state, rng, temperature)
+            if following is None:
+                return
+            meter.add([following])
+            track = Track(following, track)
+            yield track
+
+    def _step(
+        self, simulator: Simulator, state: State, rng: np.random.Generator | None, temperature: float
+    ) -> State | None:
+        """The state after the first action in order that there is room for; None where that is STOP."""
+        for action in self.ranked(simulator, state, rng, temperature):
+            if action == STOP:
+                return None
+            try:
+                return simulator.transition(state, action)
+            except IllegalActionError:  # a hole that fits nowhere
+                continue
+        return None
+
+    def _indices(self, actions: Sequence[Action]) -> Iterator[int]:
+        """The numbers of the actions that have one."""
+        for action in actions:
+            try:
+                yield self.codec.encode(action)
+            except IllegalActionError:
+                continue

@@ -1,0 +1,174 @@
+"""The policy network in the clothes of Stable-Baselines3: one class of policy for each kind of algorithm.
+
+Their feature extractor, action net and value net are the parts of `MeshNet`, by the same names. Illegal actions are
+masked inside the policy, by the key `action_mask` of the observation, whatever the algorithm.
+"""
+
+from typing import Any
+
+import gymnasium
+import torch
+from sb3_contrib.common.maskable.policies import MaskableActorCriticPolicy
+from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+from stable_baselines3.common.type_aliases import Schedule
+from stable_baselines3.dqn.policies import DQNPolicy, QNetwork
+from torch import Tensor, nn
+
+from agents.rl.config import NetConfig, Rules
+from agents.rl.network import NEVER, Encoded, MeshEncoder, MeshNet, PointerHead, ValueHead, begin_flat
+
+PARTS = ("features_extractor", "action_net", "value_net")
+
+
+class MeshFeatures(BaseFeaturesExtractor):
+    """`MeshEncoder` as a features extractor; what it gives is no tensor but `Encoded`."""
+
+    def __init__(self, observation_space: gymnasium.Space[Any], net: NetConfig, rules: Rules) -> None:
+        super().__init__(observation_space, features_dim=net.width)
+        self.encoder = MeshEncoder(net, rules)
+
+    def forward(self, observations: dict[str, Tensor]) -> Encoded:
+        encoded: Encoded = self.encoder(observations)
+        return encoded
+
+
+class _Split(nn.Module):
+    """Where SB3 has layers between features and heads: all for the actor, what is known of the whole for the critic."""
+
+    def forward(self, encoded: Encoded) -> tuple[Encoded, Tensor]:
+        return encoded, encoded.whole
+
+    def forward_actor(self, encoded: Encoded) -> Encoded:
+        return encoded
+
+    def forward_critic(self, encoded: Encoded) -> Tensor:
+        return encoded.whole
+
+
+def _settings(net: NetConfig, rules: Rules) -> dict[str, Any]:
+    """What all policies are built with. Pictures are scaled by the network itself."""
+    return {
+        "features_extractor_class": MeshFeatures,
+        "features_extractor_kwargs": {"net": net, "rules": rules},
+        "normalize_images": False,
+    }
+
+
+class PointerPolicy(ActorCriticPolicy):
+    """For PPO and A2C."""
+
+    def __init__(
+        self,
+        observation_space: gymnasium.Space[Any],
+        action_space: gymnasium.Space[Any],
+        lr_schedule: Schedule,
+        net: NetConfig,
+        rules: Rules,
+        **kwargs: Any,
+    ) -> None:
+        self.net_config, self.rules = net, rules
+        given = {**_settings(net, rules), "ortho_init": False, **kwargs}
+        super().__init__(observation_space, action_space, lr_schedule, **given)
+
+    def _build(self, lr_schedule: Schedule) -> None:
+        _build_heads(self, lr_schedule)
+
+    def _get_constructor_parameters(self) -> dict[str, Any]:
+        return _constructor(super()._get_constructor_parameters(), self.net_config, self.rules)
+
+
+class MaskablePointerPolicy(MaskableActorCriticPolicy):
+    """For MaskablePPO."""
+
+    def __init__(
+        self,
+        observation_space: gymnasium.Space[Any],
+        action_space: gymnasium.Space[Any],
+        lr_schedule: Schedule,
+        net: NetConfig,
+        rules: Rules,
+        **kwargs: Any,
+    ) -> None:
+        self.net_config, self.rules = net, rules
+        given = {**_settings(net, rules), "ortho_init": False, **kwargs}
+        super().__init__(observation_space, action_space, lr_schedule, **given)
+
+    def _build(self, lr_schedule: Schedule) -> None:
+        _build_heads(self, lr_schedule)
+
+    def _get_constructor_parameters(self) -> dict[str, Any]:
+        return _constructor(super()._get_constructor_parameters(), self.net_config, self.rules)
+
+
+class PointerQNetwork(QNetwork):
+    """Q of an action: what is still to be gained, and how much better than that the action is."""
+
+    def __init__(self, *args: Any, net: NetConfig, rules: Rules, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.q_net = nn.Sequential()  # SB3's own layers are not used
+        self.action_net = PointerHead(net, rules)
+        self.value_net = ValueHead(net)
+        begin_flat(self.action_net)
+
+    def forward(self, obs: Any) -> Tensor:
+        encoded: Any = self.extract_features(obs, self.features_extractor)
+        better: Tensor = self.action_net(encoded)
+        return torch.where(better > 0.5 * NEVER, better + self.value_net(encoded.whole), NEVER)
+
+
+class PointerDqnPolicy(DQNPolicy):
+    """For DQN."""
+
+    def __init__(
+        self,
+        observation_space: gymnasium.Space[Any],
+        action_space: gymnasium.spaces.Discrete,
+        lr_schedule: Schedule,
+        net: NetConfig,
+        rules: Rules,
+        **kwargs: Any,
+    ) -> None:
+        self.net_config, self.rules = net, rules
+        given = {**_settings(net, rules), "net_arch": [], **kwargs}
+        super().__init__(observation_space, action_space, lr_schedule, **given)
+
+    def make_q_net(self) -> QNetwork:
+        net_args = self._update_features_extractor(self.net_args, features_extractor=None)
+        return PointerQNetwork(**net_args, net=self.net_config, rules=self.rules).to(self.device)
+
+    def _get_constructor_parameters(self) -> dict[str, Any]:
+        return _constructor(super()._get_constructor_parameters(), self.net_config, self.rules)
+
+
+def _build_heads(policy: Any, lr_schedule: Schedule) -> None:
+    policy.mlp_extractor = _Split()
+    policy.action_net = PointerHead(policy.net_config, policy.rules)
+    policy.value_net = ValueHead(policy.net_config)
+    begin_flat(policy.action_net)
+    policy.optimizer = policy.optimizer_class(policy.parameters(), lr=lr_schedule(1), **policy.optimizer_kwargs)
+
+
+def _constructor(parameters: dict[str, Any], net: NetConfig, rules: Rules) -> dict[str, Any]:
+    ours = ("features_extractor_class", "features_extractor_kwargs")
+    return {**{k: v for k, v in parameters.items() if k not in ours}, "net": net, "rules": rules}
+
+
+def net_of(policy: Any) -> MeshNet:
+    """The network of a policy, as a copy on the CPU."""
+    inner = getattr(policy, "q_net", policy)
+    net = MeshNet(policy.net_config, policy.rules)
+    for name in PARTS:
+        part = getattr(inner, name)
+        part = part.encoder if isinstance(part, MeshFeatures) else part
+        getattr(net, name).load_state_dict({k: v.detach().cpu() for k, v in part.state_dict().items()})
+    return net.eval()
+
+
+def put_net(policy: Any, net: MeshNet) -> None:
+    """Let a policy go on from a network."""
+    for inner in [getattr(policy, "q_net", policy), getattr(policy, "q_net_target", None)]:
+        for name in PARTS if inner is not None else ():
+            part = getattr(inner, name)
+            part = part.encoder if isinstance(part, MeshFeatures) else part
+            part.load_state_dict(getattr(net, name).state_dict())

@@ -1,0 +1,212 @@
+"""Settings of `training.train_rl`, and how a run notes and compares them."""
+
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from agents.rl.config import NetConfig, Rules
+from autopoly_env.errors import ConfigError
+from autopoly_env.operators import preset
+
+HARMLESS = (  # a run may go on with other ones
+    "total_steps",
+    "minutes",
+    "envs",
+    "device",
+    "n_threads",
+    "eval_every",
+    "save_every",
+    "n_plays",
+)
+
+
+@dataclass(frozen=True)
+class CourseConfig:
+    """What is built, and for which price. Environments take the courses in turn."""
+
+    targets: str = "construction"  # "construction", "objects" or a folder of images
+    w_sc: float = 1.0  # price of an element, in points of r_all
+    difficulty: tuple[int, int] = (1, 5)  # of constructions
+    operators: str = "paper"  # that constructions are made with
+
+    def __post_init__(self) -> None:
+        if not self.w_sc >= 0.0:
+            raise ConfigError(f"w_sc {self.w_sc}: expected a price of at least 0")
+
+
+@dataclass(frozen=True)
+class EnvConfig:
+    """The environments."""
+
+    courses: tuple[CourseConfig, ...] = (CourseConfig(), CourseConfig("objects", 0.3))
+    operators: str = "full"  # that the policy has
+    resolution: int = 64  # pixels a side at which meshes are fitted and scored while learning
+    obs_resolution: int = 64  # pixels a side of the observed pictures
+    max_steps: int = 24
+    max_vertices: int = 48
+    reward_scale: float = 0.1  # reward of a point of r_all
+    illegal_penalty: float = 1.0  # points of r_all
+    n_plays: int = 4  # episodes with a target before the next one comes, which takes longer than a step
+
+    def __post_init__(self) -> None:
+        if self.n_plays < 1:
+            raise ConfigError(f"n_plays {self.n_plays}: expected at least 1")
+        if not self.courses:
+            raise ConfigError("courses: expected at least one")
+        if not (self.reward_scale > 0.0 and self.illegal_penalty >= 0.0):
+            raise ConfigError(f"{self}: expected a reward_scale above 0 and a penalty of at least 0")
+        self.rules()
+
+    def rules(self) -> Rules:
+        """What the policy is made for."""
+        operators = tuple(operator.name for operator in preset(self.operators))
+        return Rules(operators, self.max_vertices, self.obs_resolution, self.max_steps)
+
+
+@dataclass(frozen=True)
+class OptimConfig:
+    """The learning rate: a linear warm-up, then a straight line down to `last`."""
+
+    lr: float = 5e-4
+    last: float = 0.1  # share of lr at the end
+    warmup: float = 0.02  # share of the training
+
+    def __post_init__(self) -> None:
+        if not (self.lr > 0.0 and 0.0 <= self.last <= 1.0 and 0.0 <= self.warmup < 1.0):
+            raise ConfigError(f"{self}: expected an lr above 0, last in 0..1 and a warmup in 0..1")
+
+    def lr_at(self, done: float) -> float:
+        """The learning rate when this share of the training, 0 to 1, is done."""
+        if done < self.warmup:
+            return self.lr * max(done / self.warmup, 0.02)
+        return self.lr * (1.0 + (self.last - 1.0) * (done - self.warmup) / (1.0 - self.warmup))
+
+
+@dataclass(frozen=True)
+class PpoOptions:
+    """SB3's own arguments of PPO and MaskablePPO."""
+
+    n_steps: int = 64  # of each environment between updates
+    batch_size: int = 512
+    n_epochs: int = 3
+    gamma: float = 1.0  # rewards add up to what the shape gained: nothing is to be hurried
+    gae_lambda: float = 0.95
+    clip_range: float = 0.2
+    ent_coef: float = 0.01
+    vf_coef: float = 0.5
+    max_grad_norm: float = 0.5
+    target_kl: float | None = None
+
+    def __post_init__(self) -> None:
+        _check(self, n_steps=2, batch_size=2, n_epochs=1)
+
+
+@dataclass(frozen=True)
+class A2cOptions:
+    """SB3's own arguments of A2C."""
+
+    n_steps: int = 8
+    gamma: float = 1.0
+    gae_lambda: float = 0.95
+    ent_coef: float = 0.01
+    vf_coef: float = 0.5
+    max_grad_norm: float = 0.5
+
+    def __post_init__(self) -> None:
+        _check(self, n_steps=1)
+
+
+@dataclass(frozen=True)
+class DqnOptions:
+    """SB3's own arguments of DQN."""
+
+    buffer_size: int = 50_000  # transitions, 25 kB each
+    learning_starts: int = 2_000  # steps of random play
+    batch_size: int = 128
+    gamma: float = 1.0
+    train_freq: int = 4  # steps of each environment between updates
+    gradient_steps: int = 8
+    target_update_interval: int = 2_000
+    exploration_fraction: float = 0.3
+    exploration_final_eps: float = 0.05
+    max_grad_norm: float = 5.0
+
+    def __post_init__(self) -> None:
+        _check(self, buffer_size=1, batch_size=1, train_freq=1, gradient_steps=1, target_update_interval=1)
+
+
+@dataclass(frozen=True)
+class CurriculumConfig:
+    """Easy constructions first: the greatest difficulty grows from 1 to that of the course."""
+
+    enabled: bool = False
+    until: float = 0.5  # share of the training after which it is that of the course
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.until <= 1.0:
+            raise ConfigError(f"until {self.until}: expected a share of the training, above 0 and at most 1")
+
+
+@dataclass(frozen=True)
+class RunConfig:
+    """How a run is carried out."""
+
+    seed: int = 0
+    total_steps: int = 1_000_000  # of all environments together
+    minutes: float = 0.0  # after which it ends, whichever comes first; 0: no limit
+    n_envs: int = 32
+    envs: Literal["native", "subproc"] = "native"  # all in one process, or one process each
+    device: Literal["auto", "cpu", "cuda"] = "auto"
+    n_threads: int = 0  # of torch; 0: as it likes
+    init: str = ""  # weights to begin with: a .safetensors file, or a .zip of SB3
+    eval_every: int = 50_000  # steps
+    n_eval: int = 48  # targets of each course
+    eval_resolution: int = 128  # pixels a side
+    save_every: int = 20_000  # steps
+
+    def __post_init__(self) -> None:
+        if min(self.total_steps, self.n_envs, self.eval_every, self.n_eval, self.save_every) < 1:
+            raise ConfigError(f"{self}: expected steps, environments and targets of at least 1")
+        if min(self.seed, self.n_threads, self.minutes) < 0:
+            raise ConfigError(f"{self}: expected a seed, n_threads and minutes of at least 0")
+
+
+@dataclass(frozen=True)
+class TrainRlConfig:
+    """Everything that can be set."""
+
+    algorithm: Literal["maskable_ppo", "ppo", "a2c", "dqn"] = "maskable_ppo"
+    net: NetConfig = field(default_factory=NetConfig)
+    env: EnvConfig = field(default_factory=EnvConfig)
+    optim: OptimConfig = field(default_factory=OptimConfig)
+    ppo: PpoOptions = field(default_factory=PpoOptions)
+    a2c: A2cOptions = field(default_factory=A2cOptions)
+    dqn: DqnOptions = field(default_factory=DqnOptions)
+    curriculum: CurriculumConfig = field(default_factory=CurriculumConfig)
+    run: RunConfig = field(default_factory=RunConfig)
+
+    def options(self) -> PpoOptions | A2cOptions | DqnOptions:
+        """Of the algorithm."""
+        if self.algorithm == "a2c":
+            return self.a2c
+        return self.dqn if self.algorithm == "dqn" else self.ppo
+
+
+def _check(options: Any, **least: int) -> None:
+    """Raise ConfigError for what is out of range in the arguments of an algorithm."""
+    for name, bound in {**least, "max_grad_norm": 0, "ent_coef": 0, "vf_coef": 0}.items():
+        if not getattr(options, name, bound) >= bound:
+            raise ConfigError(f"{name} = {getattr(options, name)}: expected at least {bound}")
+    if not 0.0 <= options.gamma <= 1.0:
+        raise ConfigError(f"gamma = {options.gamma}: expected a discount, 0 to 1")
+
+
+def first_difference(one: Any, other: Any, key: str = "") -> str:
+    """The dotted key of the first setting that differs, but for harmless ones; empty if there is none."""
+    if not (isinstance(one, dict) and isinstance(other, dict)):
+        return "" if one == other else key
+    for name in sorted(one.keys() | other.keys()):
+        if name not in HARMLESS:
+            found = first_difference(one.get(name), other.get(name), f"{key}.{name}".lstrip("."))
+            if found:
+                return found
+    return ""

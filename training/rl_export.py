@@ -1,0 +1,55 @@
+"""The policy that comes with the project: weights and model card, from a run's folder to where the agents look."""
+
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+
+from agents.guided.layers import n_parameters
+from agents.rl.weights import SHIPPED, Meta, load_policy
+from autopoly_env.files import write_atomically
+
+
+def export_policy(path: Path, algorithm: str, arguments: Sequence[str]) -> Path:
+    """Copy a policy with its .json, and write its card; returns the folder. Raises ConfigError for a damaged one."""
+    net, meta = load_policy(path)
+    goal = SHIPPED / f"{algorithm}.safetensors"
+    goal.with_suffix(".json").unlink(missing_ok=True)
+    write_atomically(goal, path.read_bytes())
+    write_atomically(goal.with_suffix(".json"), path.with_suffix(".json").read_bytes())
+    write_atomically(goal.with_suffix(".md"), card(meta, n_parameters(net), arguments))
+    return goal.parent
+
+
+def card(meta: Meta, n: int, arguments: Sequence[str]) -> str:
+    """The model card."""
+    rows = "\n".join(
+        f"| {name} | {value:.4g} |" for name, value in meta.metrics.items() if isinstance(value, int | float)
+    )
+    env = meta.training.get("env", {})
+    init = meta.training.get("run", {}).get("init", "")
+    begin = f"It went on from `{init}`." if init else "It began with random weights."
+    courses = "; ".join(f"{c['targets']} at w_sc {c['w_sc']:g}" for c in env.get("courses", []))
+    rules = ", ".join(f"{k} {v if not isinstance(v, list) else ' '.join(v)}" for k, v in meta.rules.items())
+    return f"""# {meta.algorithm}
+
+A policy that reads a mesh, its rendering and a target silhouette, and points at the next modelling action. {n}
+parameters. {begin}
+
+**Data.** Targets are made by `autopoly_env.targets`: {courses}. Seeds from 2^30 on were held out and are what the
+metrics are of. No picture from outside was used.
+
+**Command.** `python -m training.train_rl {shlex.join(arguments)}`, seed {meta.training.get("run", {}).get("seed", 0)}.
+
+**Made for.** {rules}.
+
+**Held-out metrics**, one greedy play for each target (`training/rl_exam.py` says what they are)
+
+| metric | value |
+|---|---|
+{rows}
+
+**Limits.** Pictures of {meta.rules.get("obs_resolution")} pixels a side do not show details below two pixels. The price
+of an element is an input, but only the prices above were trained. After {meta.rules.get("max_steps")} steps it stops.
+
+**Settings.** In the `.json` beside the weights, under `training`.
+"""
