@@ -2,13 +2,15 @@
 
 import json
 import os
+from collections.abc import Collection
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any, TypeVar
 
 import yaml
 
 from agents.options import read_yaml, validated
-from autopoly_env.errors import ConfigError
+from autopoly_env.errors import ConfigError, RunError
 
 _Config = TypeVar("_Config")
 
@@ -45,6 +47,27 @@ def plain(config: Any) -> dict[str, Any]:
     """A config as JSON knows it."""
     values: dict[str, Any] = json.loads(json.dumps(asdict(config)))
     return values
+
+
+def check_same_run(folder: Path, known: Any, given: Any, harmless: Collection[str]) -> None:
+    """Raise RunError, which names the first setting that differs, unless a run may go on with what is given.
+
+    `harmless` settings may differ.
+    """
+    key = _first_difference(known, given, harmless)
+    if key:
+        raise RunError(f"{folder} belongs to a run with another {key}; give another --out, or the same settings")
+
+
+def _first_difference(one: Any, other: Any, harmless: Collection[str], key: str = "") -> str:
+    """The dotted key of the first setting that is not the same in both; empty if there is none."""
+    if not (isinstance(one, dict) and isinstance(other, dict)):
+        return "" if one == other else key
+    for name in sorted((one.keys() | other.keys()) - set(harmless)):
+        found = _first_difference(one.get(name), other.get(name), harmless, f"{key}.{name}".lstrip("."))
+        if found:
+            return found
+    return ""
 
 
 def _merge(values: dict[str, Any], given: dict[Any, Any], where: str) -> None:

@@ -198,15 +198,3 @@ def _check(options: Any, **least: int) -> None:
             raise ConfigError(f"{name} = {getattr(options, name)}: expected at least {bound}")
     if not 0.0 <= options.gamma <= 1.0:
         raise ConfigError(f"gamma = {options.gamma}: expected a discount, 0 to 1")
-
-
-def first_difference(one: Any, other: Any, key: str = "") -> str:
-    """The dotted key of the first setting that differs, but for harmless ones; empty if there is none."""
-    if not (isinstance(one, dict) and isinstance(other, dict)):
-        return "" if one == other else key
-    for name in sorted(one.keys() | other.keys()):
-        if name not in HARMLESS:
-            found = first_difference(one.get(name), other.get(name), f"{key}.{name}".lstrip("."))
-            if found:
-                return found
-    return ""

@@ -83,7 +83,7 @@ def nfap_sample(trajectory: Trajectory, k: int, config: NfapConfig, labels: Labe
         "regions": np.stack((expected, *regions[1:])),
         "operators": np.array(operators),
         "first": first.astype(np.float32),
-        **candidate_arrays(state.mesh, state.actions, trajectory.silhouette),
+        **candidate_arrays(Disagreement(state.mesh, trajectory.silhouette), state.actions),
         "log_residual": state.log_residual,
         "policy": (policy[1:] / moving if moving > 1e-6 else 0.0 * policy[1:]).astype(np.float32),
         "gains": np.where(np.isfinite(gains), gains, -1e3).astype(np.float32),

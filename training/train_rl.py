@@ -35,8 +35,8 @@ from agents.rl.network import MeshNet
 from agents.rl.policies import net_of, put_net
 from agents.rl.weights import load_policy, read_meta, save_policy
 from autopoly_env.errors import ConfigError, RunError
-from training.options import plain, read_config
-from training.rl_config import RunConfig, TrainRlConfig, first_difference
+from training.options import check_same_run, plain, read_config
+from training.rl_config import HARMLESS, RunConfig, TrainRlConfig
 from training.rl_exam import exams_of, mean_final, sit_all, told
 from training.rl_export import export_policy
 from training.run_log import RunLog
@@ -299,9 +299,7 @@ def _standing(config: TrainRlConfig, folder: Path) -> Standing:
     note = read_note(path)
     if note is None:
         raise RunError(f"{path} was not written by this project's training; give another --out")
-    key = first_difference(note["settings"], plain(config))
-    if key:
-        raise RunError(f"{folder} belongs to a run with another {key}; give another --out, or the same settings")
+    check_same_run(folder, note["settings"], plain(config), HARMLESS)
     best = -math.inf if note["best"] is None else float(note["best"])
     best_step = int(note["best_step"])
     try:  # a policy may have been kept after the checkpoint

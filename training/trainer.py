@@ -21,6 +21,7 @@ from torch.nn.parallel import DistributedDataParallel
 
 from autopoly_env.errors import ConfigError, RunError
 from autopoly_env.files import write_atomically
+from training.options import check_same_run
 from training.run_log import RunLog
 from training.samples import Batch, batches
 
@@ -263,22 +264,7 @@ def _resume(
         known, saved = state["settings"], state["progress"]
     except Exception as error:  # torch raises whatever the damage leads it to
         raise RunError(f"cannot read {path} ({type(error).__name__}); delete it to begin anew") from None
-    key = _first_difference(known, settings)
-    if key:
-        raise RunError(f"{folder} belongs to a run with another {key}; give another --out, or the same settings")
+    check_same_run(folder, known, settings, _HARMLESS)
     task.net.load_state_dict(state["net"])
     optimizer.load_state_dict(state["optimizer"])
     vars(progress).update(saved)
-
-
-def _first_difference(one: Any, other: Any, key: str = "") -> str:
-    """The dotted key of the first setting that is not the same in both; empty if there is none."""
-    if not (isinstance(one, dict) and isinstance(other, dict)):
-        return "" if one == other else key
-    for name in sorted(one.keys() | other.keys()):
-        if name in _HARMLESS:
-            continue
-        found = _first_difference(one.get(name), other.get(name), f"{key}.{name}".lstrip("."))
-        if found:
-            return found
-    return ""

@@ -49,8 +49,9 @@ class NfapEvaluator:
         self._waiting: list[PolyMesh] = []  # made and not evaluated yet: they are, with the next one that is asked for
 
     def prior(self, simulator: Simulator, state: State, actions: Sequence[Action]) -> FloatArray:
-        arrays = candidate_arrays(state.mesh, actions, simulator.silhouette)
-        arrays["log_residual"] = np.log(self._residual.prior(simulator, state, actions)).astype(np.float32)
+        disagreement = Disagreement(state.mesh, simulator.silhouette)
+        arrays = candidate_arrays(disagreement, actions)
+        arrays["log_residual"] = np.log(self._residual.prior_by(disagreement, actions)).astype(np.float32)
         candidates = candidates_of({name: torch.from_numpy(array)[None] for name, array in arrays.items()})
         with torch.inference_mode():
             logits = self._net.choose(self._first_stage(simulator, state), candidates)

@@ -18,20 +18,20 @@ from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import OPERATORS
 from autopoly_env.placement import Disagreement
 from autopoly_env.placement_kernels import AREA, DEPTH, MASS
-from autopoly_env.silhouette import Silhouette
 
 N_MEASURES = 9
 _ALONG = (np.arange(N_POINTS) + 0.5)[:, None] / N_POINTS
 
 
-def candidate_arrays(mesh: PolyMesh, actions: Sequence[Action], silhouette: Silhouette) -> dict[str, NDArray[Any]]:
+def candidate_arrays(disagreement: Disagreement, actions: Sequence[Action]) -> dict[str, NDArray[Any]]:
     """What nFAP-Net reads about the legal actions, the residual prior left out: `agents.guided.nfap.Candidates`."""
+    mesh = disagreement.mesh
     points = action_points(mesh, actions)
     return {
         "points": points.astype(np.float32),
         "classes": np.array([class_of(action) for action in actions], np.int64),
         "spots": action_spots(mesh, actions, points).astype(np.float32),
-        "measures": action_measures(Disagreement(mesh, silhouette), actions).astype(np.float32),
+        "measures": action_measures(disagreement, actions).astype(np.float32),
     }
 
 

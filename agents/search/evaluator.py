@@ -48,7 +48,10 @@ class ResidualEvaluator(UniformEvaluator):
     _FLOOR = 1e-3  # of the likeliest action, for all
 
     def prior(self, simulator: Simulator, state: State, actions: Sequence[Action]) -> FloatArray:
-        disagreement = Disagreement(state.mesh, simulator.silhouette)
+        return self.prior_by(Disagreement(state.mesh, simulator.silhouette), actions)
+
+    def prior_by(self, disagreement: Disagreement, actions: Sequence[Action]) -> FloatArray:
+        """The prior, where the disagreement is known already."""
         promise = np.array([self._promise(disagreement, action) for action in actions])
         promise += self._FLOOR * max(float(promise.max()), 1e-9)
         normalised: FloatArray = promise / promise.sum()
