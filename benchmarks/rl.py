@@ -19,7 +19,7 @@ from agents.base import Budget, Meter, Track, finish
 from agents.command import FAILURE, run_command
 from agents.registry import make_agent
 from agents.rl.player import Player
-from agents.rl.weights import load_policy, read_meta
+from agents.rl.weights import load_policy, read_policy_meta
 from autopoly_env.errors import ConfigError
 from autopoly_env.files import write_atomically
 from autopoly_env.score import ScoreWeights
@@ -281,7 +281,7 @@ def cases_of(policies: Sequence[Path], n: int, results: dict[Case, Found]) -> It
     """What is to be measured: first what needs nothing else, then what gets the refits that random took."""
     targets = [target for kind in PRICES for target in made(kind, n)]
     plain = [Case(target, method) for method in (RECTANGLE, GREEDY, RANDOM) for target in targets]
-    hashes = {str(path): read_meta(path).sha256 for path in policies}
+    hashes = {str(path): read_policy_meta(path).sha256 for path in policies}
     methods = (ONE_PASS, PARED, BEST)
     first = [*plain, *(Case(t, m, p, h) for p, h in hashes.items() for m in methods for t in targets)]
     yield first

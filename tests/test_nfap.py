@@ -21,7 +21,7 @@ from agents.guided.nfap import NfapLabels, NfapNet, candidates_of, loss_terms
 from agents.guided.pictures import draw_inputs
 from agents.guided.regions import N_POINTS, action_points, region_image
 from agents.guided.warp import WarpNet
-from agents.guided.weights import SHIPPED, Meta, load_nfap, load_warpnet, save_weights
+from agents.guided.weights import SHIPPED, NetworkMeta, load_nfap, load_warpnet, save_weights
 from agents.registry import make_agent
 from agents.search.evaluator import ResidualEvaluator
 from autopoly_env.actions import STOP, Action, legal_actions
@@ -50,9 +50,13 @@ def make_net(config: NfapConfig = RICH, seed: int = 0) -> NfapNet:
     return NfapNet(config).eval()
 
 
+def meta_of(training: dict[str, Any]) -> NetworkMeta:
+    return NetworkMeta(kind="nfap", config={}, shapes={}, sha256="", training=training, metrics={})
+
+
 def make_evaluator(net: NfapNet | None = None, temperature: float = 0.5) -> NfapEvaluator:
     labels = {"labels": {"w_sc": 0.3, "temperature": temperature}}
-    return NfapEvaluator(net or make_net(), Meta("nfap", {}, {}, "", labels, {}))
+    return NfapEvaluator(net or make_net(), meta_of(labels))
 
 
 @pytest.fixture
@@ -306,7 +310,7 @@ def test_warp_expand__needs_no_refit_and_is_never_worse_than_the_bare_action(pla
     torch.manual_seed(1)
     warp = WarpNet(WarpConfig(image_size=32, grid=4, feature=16, widths=(4, 4, 8, 8)))
     torch.nn.init.normal_(warp.head.weight, std=0.01)
-    evaluator = WarpEvaluator(make_net(), Meta("nfap", {}, {}, "", {}, {}), warp, placed=placed)
+    evaluator = WarpEvaluator(make_net(), meta_of({}), warp, placed=placed)
     state = simulator.initial()
     actions = simulator.legal_actions(state)[1:]
     children = evaluator.expand(simulator, state, actions)
@@ -410,8 +414,8 @@ def test_weights__that_are_truncated_are_refused(weights: dict[str, str]) -> Non
         ({"sha256": "0" * 64}, "sha256 differs"),
         ({"kind": "warpnet"}, "weights of 'warpnet'; expected those of 'nfap'"),
         ({"config": {"n": 0}}, "expected 1 to 16 stages"),
-        ({"config": {"image_size": 64, "n": 2}}, "has shape .* the config wants"),
-        ({"config": {"n": "two"}}, "config does not fit"),
+        ({"config": {"image_size": 64, "n": 2}}, "has shape .* the settings want"),
+        ({"config": {"n": "two"}}, "settings do not fit"),
         ({"shapes": 3}, "shapes: "),
     ],
 )

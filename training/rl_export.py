@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from agents.guided.layers import n_parameters
-from agents.rl.weights import SHIPPED, Meta, load_policy
+from agents.rl.weights import SHIPPED, PolicyMeta, load_policy
 from autopoly_env.files import write_atomically
 
 
@@ -20,7 +20,7 @@ def export_policy(path: Path, algorithm: str, arguments: Sequence[str]) -> Path:
     return goal.parent
 
 
-def card(meta: Meta, n: int, arguments: Sequence[str]) -> str:
+def card(meta: PolicyMeta, n: int, arguments: Sequence[str]) -> str:
     """The model card."""
     rows = "\n".join(
         f"| {name} | {value:.4g} |" for name, value in meta.metrics.items() if isinstance(value, int | float)

@@ -33,7 +33,7 @@ from agents.rl.algorithms import load_checkpoint, make_model, net_of_zip, read_n
 from agents.rl.envs import Course, Table, make_vec_env
 from agents.rl.network import MeshNet
 from agents.rl.policies import net_of, put_net
-from agents.rl.weights import load_policy, read_meta, save_policy
+from agents.rl.weights import load_policy, read_policy_meta, save_policy
 from autopoly_env.errors import ConfigError, RunError
 from training.options import check_same_run, plain, read_config
 from training.rl_config import HARMLESS, RunConfig, TrainRlConfig
@@ -303,7 +303,7 @@ def _standing(config: TrainRlConfig, folder: Path) -> Standing:
     best = -math.inf if note["best"] is None else float(note["best"])
     best_step = int(note["best_step"])
     try:  # a policy may have been kept after the checkpoint
-        kept = read_meta(folder / "policy.safetensors").metrics
+        kept = read_policy_meta(folder / "policy.safetensors").metrics
         best, best_step = float(kept["final"]), int(kept["step"])
     except (ConfigError, KeyError, TypeError, ValueError):
         pass

@@ -19,7 +19,7 @@ from agents.guided.measures import candidate_arrays
 from agents.guided.nfap import Foresight, NfapNet, candidates_of
 from agents.guided.pictures import draw_inputs, rendering
 from agents.guided.warp import WarpNet
-from agents.guided.weights import Meta
+from agents.guided.weights import NetworkMeta
 from agents.search.evaluator import ResidualEvaluator
 from autopoly_env.actions import Action
 from autopoly_env.arrays import FloatArray
@@ -38,7 +38,7 @@ _REMEMBERED = 256  # states whose evaluation is kept
 class NfapEvaluator:
     """nFAP-Net's priors, exact refits: the agent `nfap-prior`."""
 
-    def __init__(self, net: NfapNet, meta: Meta, temperature: float = 1.0) -> None:
+    def __init__(self, net: NfapNet, meta: NetworkMeta, temperature: float = 1.0) -> None:
         self._net, self._temperature = net, temperature
         labels = meta.training.get("labels", {})
         self._trained_w_sc = float(labels.get("w_sc", 0.3))
@@ -111,7 +111,9 @@ class WarpEvaluator(NfapEvaluator):
     Locked vertices and symmetry only a refit can heed: where a user has asked for them, it is refits after all.
     """
 
-    def __init__(self, net: NfapNet, meta: Meta, warp: WarpNet, temperature: float = 1.0, placed: bool = True) -> None:
+    def __init__(
+        self, net: NfapNet, meta: NetworkMeta, warp: WarpNet, temperature: float = 1.0, placed: bool = True
+    ) -> None:
         super().__init__(net, meta, temperature)
         self._warp, self._placed = warp, placed
 

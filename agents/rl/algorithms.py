@@ -24,7 +24,7 @@ from agents.options import validated
 from agents.rl.config import NetConfig, Rules
 from agents.rl.network import MeshNet
 from agents.rl.policies import PARTS, MaskablePointerPolicy, PointerDqnPolicy, PointerPolicy
-from agents.rl.weights import fill
+from agents.weights_file import fill
 from autopoly_env.errors import ConfigError, RunError
 from autopoly_env.files import write_atomically
 

@@ -4,12 +4,12 @@ Their feature extractor, action net and value net are the parts of `MeshNet`, by
 masked inside the policy, by the key `action_mask` of the observation, whatever the algorithm.
 """
 
-from typing import Any
+from typing import Any, ClassVar
 
 import gymnasium
 import torch
 from sb3_contrib.common.maskable.policies import MaskableActorCriticPolicy
-from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.policies import ActorCriticPolicy, BasePolicy
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.type_aliases import Schedule
 from stable_baselines3.dqn.policies import DQNPolicy, QNetwork
@@ -46,59 +46,54 @@ class _Split(nn.Module):
         return encoded.whole
 
 
-def _settings(net: NetConfig, rules: Rules) -> dict[str, Any]:
-    """What all policies are built with. Pictures are scaled by the network itself."""
-    return {
-        "features_extractor_class": MeshFeatures,
-        "features_extractor_kwargs": {"net": net, "rules": rules},
-        "normalize_images": False,
-    }
+class _Pointing(BasePolicy):
+    """What the policies of all algorithms share: how they are built, and built again from a zip."""
+
+    _more: ClassVar[dict[str, Any]] = {}  # settings of SB3's class
+
+    def __init__(
+        self,
+        observation_space: gymnasium.Space[Any],
+        action_space: gymnasium.Space[Any],
+        lr_schedule: Schedule,
+        net: NetConfig,
+        rules: Rules,
+        **kwargs: Any,
+    ) -> None:
+        self.net_config, self.rules = net, rules
+        given = {
+            "features_extractor_class": MeshFeatures,
+            "features_extractor_kwargs": {"net": net, "rules": rules},
+            "normalize_images": False,  # the network scales pictures by itself
+        }
+        super().__init__(observation_space, action_space, lr_schedule, **{**given, **self._more, **kwargs})
+
+    def _get_constructor_parameters(self) -> dict[str, Any]:
+        ours = ("features_extractor_class", "features_extractor_kwargs")
+        parameters = {k: v for k, v in super()._get_constructor_parameters().items() if k not in ours}
+        return {**parameters, "net": self.net_config, "rules": self.rules}
 
 
-class PointerPolicy(ActorCriticPolicy):
+class _ActorCritic(_Pointing):
+    """A pointer head for the actor and a value head for the critic, where SB3 would build layers of its own."""
+
+    _more: ClassVar[dict[str, Any]] = {"ortho_init": False}
+
+    def _build(self, lr_schedule: Schedule) -> None:
+        policy: Any = self  # SB3 declares its own layers in these places
+        policy.mlp_extractor = _Split()
+        policy.action_net = PointerHead(self.net_config, self.rules)
+        policy.value_net = ValueHead(self.net_config)
+        begin_flat(policy.action_net)
+        policy.optimizer = policy.optimizer_class(self.parameters(), lr=lr_schedule(1), **self.optimizer_kwargs)
+
+
+class PointerPolicy(_ActorCritic, ActorCriticPolicy):
     """For PPO and A2C."""
 
-    def __init__(
-        self,
-        observation_space: gymnasium.Space[Any],
-        action_space: gymnasium.Space[Any],
-        lr_schedule: Schedule,
-        net: NetConfig,
-        rules: Rules,
-        **kwargs: Any,
-    ) -> None:
-        self.net_config, self.rules = net, rules
-        given = {**_settings(net, rules), "ortho_init": False, **kwargs}
-        super().__init__(observation_space, action_space, lr_schedule, **given)
 
-    def _build(self, lr_schedule: Schedule) -> None:
-        _build_heads(self, lr_schedule)
-
-    def _get_constructor_parameters(self) -> dict[str, Any]:
-        return _constructor(super()._get_constructor_parameters(), self.net_config, self.rules)
-
-
-class MaskablePointerPolicy(MaskableActorCriticPolicy):
+class MaskablePointerPolicy(_ActorCritic, MaskableActorCriticPolicy):
     """For MaskablePPO."""
-
-    def __init__(
-        self,
-        observation_space: gymnasium.Space[Any],
-        action_space: gymnasium.Space[Any],
-        lr_schedule: Schedule,
-        net: NetConfig,
-        rules: Rules,
-        **kwargs: Any,
-    ) -> None:
-        self.net_config, self.rules = net, rules
-        given = {**_settings(net, rules), "ortho_init": False, **kwargs}
-        super().__init__(observation_space, action_space, lr_schedule, **given)
-
-    def _build(self, lr_schedule: Schedule) -> None:
-        _build_heads(self, lr_schedule)
-
-    def _get_constructor_parameters(self) -> dict[str, Any]:
-        return _constructor(super()._get_constructor_parameters(), self.net_config, self.rules)
 
 
 class PointerQNetwork(QNetwork):
@@ -117,41 +112,14 @@ class PointerQNetwork(QNetwork):
         return torch.where(better > 0.5 * NEVER, better + self.value_net(encoded.whole), NEVER)
 
 
-class PointerDqnPolicy(DQNPolicy):
+class PointerDqnPolicy(_Pointing, DQNPolicy):
     """For DQN."""
 
-    def __init__(
-        self,
-        observation_space: gymnasium.Space[Any],
-        action_space: gymnasium.spaces.Discrete,
-        lr_schedule: Schedule,
-        net: NetConfig,
-        rules: Rules,
-        **kwargs: Any,
-    ) -> None:
-        self.net_config, self.rules = net, rules
-        given = {**_settings(net, rules), "net_arch": [], **kwargs}
-        super().__init__(observation_space, action_space, lr_schedule, **given)
+    _more: ClassVar[dict[str, Any]] = {"net_arch": []}
 
     def make_q_net(self) -> QNetwork:
         net_args = self._update_features_extractor(self.net_args, features_extractor=None)
         return PointerQNetwork(**net_args, net=self.net_config, rules=self.rules).to(self.device)
-
-    def _get_constructor_parameters(self) -> dict[str, Any]:
-        return _constructor(super()._get_constructor_parameters(), self.net_config, self.rules)
-
-
-def _build_heads(policy: Any, lr_schedule: Schedule) -> None:
-    policy.mlp_extractor = _Split()
-    policy.action_net = PointerHead(policy.net_config, policy.rules)
-    policy.value_net = ValueHead(policy.net_config)
-    begin_flat(policy.action_net)
-    policy.optimizer = policy.optimizer_class(policy.parameters(), lr=lr_schedule(1), **policy.optimizer_kwargs)
-
-
-def _constructor(parameters: dict[str, Any], net: NetConfig, rules: Rules) -> dict[str, Any]:
-    ours = ("features_extractor_class", "features_extractor_kwargs")
-    return {**{k: v for k, v in parameters.items() if k not in ours}, "net": net, "rules": rules}
 
 
 def net_of(policy: Any) -> MeshNet:
