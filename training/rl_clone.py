@@ -39,7 +39,7 @@ from training.net_metrics import mean_rows
 from training.options import plain, read_config
 from training.rl_config import EnvConfig
 from training.rl_exam import exams_of, mean_final, sit_all, told
-from training.samples import Batch, LabelConfig, Sample, Stored, batches, stored
+from training.samples import Batch, HeldOut, LabelConfig, Sample, Stored, stored
 from training.trainer import OptimConfig, RunConfig, place_of, train
 from training.trajectories import Labelled, Trajectory
 
@@ -255,22 +255,13 @@ class CloneTask:
         self.net = MeshNet(config.net, config.env.rules())
         self.losses = CloneLosses(self.net, config.value_weight)
         self.stream = Pool(stored(config.data.shards), config, config.run.seed)
-        self._test = Pool(stored(config.data.held_out), config, config.run.seed, turn=False)
-        self._held_out: list[Batch] = []
-
-    def held_out(self) -> list[Batch]:
-        """The samples to measure with, in batches; made once."""
-        if not self._held_out:
-            n = self.config.data.n_held_out
-            source = batches(self._test, min(64, n), 0)
-            self._held_out = [next(source) for _ in range(-(-n // 64))]
-        return self._held_out
+        unseen = Pool(stored(config.data.held_out), config, config.run.seed, turn=False)
+        self._held_out = HeldOut(unseen, config.data.n_held_out)
 
     def measure(self, device: torch.device) -> dict[str, float]:
         """Loss, its terms, and what share of the best gain the likeliest action holds, on the held-out samples."""
         rows = []
-        for batch in self.held_out():
-            batch = {name: tensor.to(device) for name, tensor in batch.items()}
+        for batch in self._held_out.batches(device):
             logits, value = self.net(batch)
             terms = {name: float(term) for name, term in self.losses.terms(logits, value, batch).items()}
             best = batch["gains"].amax(-1)
@@ -280,8 +271,8 @@ class CloneTask:
 
     def draw(self, _device: torch.device) -> Any:
         """Renderings above their targets."""
-        batch = self.held_out()[0]
-        return np.concatenate([np.concatenate(list(batch[name][:8, 0].numpy()), axis=1) for name in _PICTURES], axis=0)
+        batch = self._held_out.first(8, torch.device("cpu"))
+        return np.concatenate([np.concatenate(list(batch[name][:, 0].numpy()), axis=1) for name in _PICTURES], axis=0)
 
 
 def finish_clone(task: CloneTask, folder: Path) -> Path:

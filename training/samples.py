@@ -29,6 +29,7 @@ from training.trajectories import Labelled, Shard, Trajectory
 
 Sample = dict[str, np.ndarray]
 Batch = dict[str, Tensor]
+_HELD_OUT_BATCH = 64
 _UNLIKELY = 0.1  # of the odds of the likeliest action: what is below has no part in the expected region
 _PADDING = {"classes": -1, "edges": -1}  # of rows that a sample does not have; 0 otherwise
 
@@ -300,6 +301,25 @@ def batches(
         prefetch_factor=4 if n_workers else None,
     )
     return iter(loader)
+
+
+class HeldOut:
+    """The samples to measure with: n of a stream, rounded up to whole batches; made once, when they are asked for."""
+
+    def __init__(self, stream: Dataset[Any], n: int) -> None:
+        self._stream, self._n, self._made = stream, n, list[Batch]()
+
+    def batches(self, device: torch.device) -> Iterator[Batch]:
+        """The batches, on a device."""
+        if not self._made:
+            source = batches(self._stream, min(_HELD_OUT_BATCH, self._n), 0)
+            self._made = [next(source) for _ in range(-(-self._n // _HELD_OUT_BATCH))]
+        for batch in self._made:
+            yield {name: tensor.to(device) for name, tensor in batch.items()}
+
+    def first(self, n: int, device: torch.device) -> Batch:
+        """The first n samples, at most a batch, on a device."""
+        return {name: tensor[:n] for name, tensor in next(self.batches(device)).items()}
 
 
 def _one_thread(_worker: int) -> None:

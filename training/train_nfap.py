@@ -26,7 +26,7 @@ from training.finish import finish_run
 from training.net_metrics import mean_rows, nfap_metrics
 from training.net_pictures import draw_nfap
 from training.options import plain, read_config
-from training.samples import Batch, LabelConfig, NfapStream, batches
+from training.samples import Batch, HeldOut, LabelConfig, NfapStream
 from training.settings import DataConfig
 from training.trainer import OptimConfig, RunConfig, place_of, train
 
@@ -89,24 +89,15 @@ class NfapTask:
         self.config = config
         self.net = NfapNet(config.net)
         self.losses = NfapLosses(self.net, config.loss, config.run)
-        learn, self._test = config.data.trajectories()
+        learn, test = config.data.trajectories()
         self.stream = NfapStream(learn, config.net, config.labels, config.run.seed)
-        self._held_out: list[Batch] = []
-
-    def held_out(self) -> list[Batch]:
-        """The samples to measure with, in batches; made once."""
-        if not self._held_out:
-            n = self.config.data.n_held_out
-            stream = NfapStream(self._test, self.config.net, self.config.labels, self.config.run.seed, turn=False)
-            source = batches(stream, min(64, n), 0)
-            self._held_out = [next(source) for _ in range(-(-n // 64))]
-        return self._held_out
+        unseen = NfapStream(test, config.net, config.labels, config.run.seed, turn=False)
+        self._held_out = HeldOut(unseen, config.data.n_held_out)
 
     def measure(self, device: torch.device) -> dict[str, float]:
         """Loss, its terms and how good the priors are, on the held-out samples."""
         rows = []
-        for batch in self.held_out():
-            batch = {name: tensor.to(device) for name, tensor in batch.items()}
+        for batch in self._held_out.batches(device):
             said = self.losses.foresee(batch)
             terms = {name: float(term) for name, term in self.losses.terms(said, batch).items()}
             rows.append({**terms, **nfap_metrics(self.net, said, batch)})
@@ -114,7 +105,7 @@ class NfapTask:
 
     def draw(self, device: torch.device) -> Any:
         """Current, target, and for every stage the true and the foreseen image and region."""
-        batch = {name: tensor[:N_DRAWN].to(device) for name, tensor in self.held_out()[0].items()}
+        batch = self._held_out.first(N_DRAWN, device)
         return draw_nfap(self.losses.foresee(batch), batch)
 
 

@@ -27,7 +27,7 @@ from training.finish import finish_run
 from training.net_metrics import mean_rows, warp_metrics
 from training.net_pictures import draw_warp
 from training.options import plain, read_config
-from training.samples import Batch, WarpStream, batches
+from training.samples import Batch, HeldOut, WarpStream
 from training.settings import DataConfig
 from training.trainer import OptimConfig, RunConfig, place_of, train
 
@@ -96,24 +96,15 @@ class WarpTask:
         self.config = config
         self.net = WarpNet(config.net)
         self.losses = WarpLosses(self.net, config.loss, config.run)
-        learn, self._test = config.data.trajectories()
+        learn, test = config.data.trajectories()
         self.stream = WarpStream(learn, config.net, config.run.seed, config.placed_share)
-        self._held_out: list[Batch] = []
-
-    def held_out(self) -> list[Batch]:
-        """The samples to measure with, in batches; made once."""
-        if not self._held_out:
-            n, config = self.config.data.n_held_out, self.config
-            stream = WarpStream(self._test, config.net, config.run.seed, config.placed_share, turn=False)
-            source = batches(stream, min(64, n), 0)
-            self._held_out = [next(source) for _ in range(-(-n // 64))]
-        return self._held_out
+        unseen = WarpStream(test, config.net, config.run.seed, config.placed_share, turn=False)
+        self._held_out = HeldOut(unseen, config.data.n_held_out)
 
     def measure(self, device: torch.device) -> dict[str, float]:
         """Loss, its terms and the share of a refit's gain, on the held-out samples."""
         rows = []
-        for batch in self.held_out():
-            batch = {name: tensor.to(device) for name, tensor in batch.items()}
+        for batch in self._held_out.batches(device):
             warps = self.losses.warps(batch)
             terms = {name: float(term) for name, term in self.losses.terms(warps).items()}
             rows.append({**terms, **warp_metrics(warps[-1].shown, batch)})
@@ -121,7 +112,7 @@ class WarpTask:
 
     def draw(self, device: torch.device) -> Any:
         """Current, target, as warped at first, the carried mesh in the end, the full refit."""
-        batch = {name: tensor[:N_DRAWN].to(device) for name, tensor in self.held_out()[0].items()}
+        batch = self._held_out.first(N_DRAWN, device)
         return draw_warp(self.net, self.losses.warps(batch), batch)
 
 
