@@ -103,7 +103,7 @@ def show(pairs: Sequence[Pair], failed: Sequence[str]) -> None:
     table = Table(box=box.SIMPLE_HEAD)
     for column in ("", "mean", "median", "least", "most"):
         table.add_column(column, justify="right" if column else "left")
-    rows = {
+    rows: dict[str, list[float]] = {
         "r_all of the mesh as it was": [one.before for one in pairs],
         "r_all of the same steps, refitted": [one.refitted for one in pairs],
         "r_all in the end": [one.after for one in pairs],

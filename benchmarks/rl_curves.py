@@ -42,10 +42,9 @@ def learning_curves(groups: Mapping[str, Sequence[Sequence[Mapping[str, float]]]
         for kind in kinds:
             values = np.array([[line[f"exam/{kind}_final"] for line in run[:n]] for run in runs])
             minutes = np.median([[line["exam/minutes"] for line in run[:n]] for run in runs], axis=0)
-            ends = np.median(values, axis=0), values.min(axis=0), values.max(axis=0)
-            curve = Curve(
-                minutes.tolist(), *(end.tolist() for end in ends), start=float(runs[0][0][f"exam/{kind}_start"])
-            )
+            middle, low, high = np.median(values, axis=0), values.min(axis=0), values.max(axis=0)
+            start = float(runs[0][0][f"exam/{kind}_start"])
+            curve = Curve(minutes.tolist(), middle.tolist(), low.tolist(), high.tolist(), start)
             curves.setdefault(kind, {})[name] = curve
     return curves
 

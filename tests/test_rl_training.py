@@ -31,7 +31,7 @@ from training.nfap_data import SourceConfig, build_trajectory
 from training.options import read_config
 from training.rl_clone import CloneConfig, CloneTask, prepared, sample_of, turned
 from training.rl_config import OptimConfig, TrainRlConfig
-from training.rl_exam import HELD_OUT, Exam, exams_of, play_all
+from training.rl_exam import HELD_OUT, Exam, exams_of, mean_final, play_all, sit_all
 from training.samples import LabelConfig, collate, stored
 from training.trainer import Place, train
 from training.trajectories import Shard, Trajectory
@@ -319,6 +319,16 @@ def test_init__takes_over_the_network(trained: dict[str, Path]) -> None:
     assert all(torch.equal(a, b) for a, b in zip(net.parameters(), load_policy(path)[0].parameters(), strict=True))
     zipped = train_rl.initial_net(config(f"run.init={trained['dqn'] / 'checkpoint.zip'}"), trust=False)
     assert zipped.rules == net.rules
+
+
+def test_run_from_a_policy__is_never_worse_than_it(trained: dict[str, Path], tmp_path: Path) -> None:
+    path = trained["maskable_ppo"] / "policy.safetensors"
+    settings = config(f"run.init={path}", "run.total_steps=128")
+    standing = train_rl.train_rl(settings, tmp_path)
+    given = mean_final(sit_all(exams_of(settings.env, 1, 32), load_policy(path)[0]))
+    exams = rows(tmp_path, "exam")
+    assert exams[0]["step"] == 0 and exams[0]["exam/final"] == pytest.approx(given) and len(exams) > 1
+    assert standing.best == max(exam["exam/final"] for exam in exams)
 
 
 @pytest.mark.parametrize("file", ["policy.safetensors", "checkpoint.zip"])

@@ -111,6 +111,11 @@ class Session(BaseCallback):
         timed = self.standing.seconds / (60.0 * run.minutes) if run.minutes else 0.0
         return min(1.0, max(self.standing.step / run.total_steps, timed))
 
+    def _on_training_start(self) -> None:
+        if self.config.run.init and not math.isfinite(self.standing.best):
+            self.examine()  # what it begins with is the best so far
+        self._mark = time.perf_counter()
+
     def _on_rollout_start(self) -> None:
         """After an update, or at the very beginning."""
         self._count(update=self._lap())
