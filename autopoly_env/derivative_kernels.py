@@ -38,7 +38,7 @@ def half_gradient(
 
     `coverage` (R, R) is the target, `row_sum` and `row_square_sum` (R, R+1) prefix sums of it and of its square.
     """
-    walk_boundary(points, edges, size, work)
+    walk_boundary(points, edges, size, work, 0, size)
     words = (size + 63) >> 6
     gradient[:] = 0.0
     loss = 0.0
@@ -124,7 +124,7 @@ def normal_equations(
     weight_sum: FloatArray | None = None,
 ) -> float:  # fmt: skip
     """As `half_gradient`, and write the lower triangle of J'WJ (2V, 2V): unknown 2v is x of vertex v, 2v+1 its y."""
-    walk_boundary(points, edges, size, work)
+    walk_boundary(points, edges, size, work, 0, size)
     words = (size + 63) >> 6
     vertices = np.empty(points.shape[0], np.int64)
     rows = np.empty((points.shape[0], 2))
@@ -229,7 +229,7 @@ def vector_jacobian(
     points: FloatArray, edges: IntArray, size: int, cotangent: FloatArray, work: Workspace, gradient: FloatArray
 ) -> None:
     """Write sum over pixels of cotangent (R, R) * d coverage / d position (unit square) into `gradient` (V, 2)."""
-    walk_boundary(points, edges, size, work)
+    walk_boundary(points, edges, size, work, 0, size)
     words = (size + 63) >> 6
     gradient[:] = 0.0
     for row in range(size):

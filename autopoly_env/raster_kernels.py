@@ -58,10 +58,12 @@ def _touch(row: int, column: int, words: int, work: Workspace) -> None:
 
 
 @kernel
-def _walk_left_of_image(y0: float, y1: float, size: int, words: int, work: Workspace) -> None:
+def _walk_left_of_image(
+    y0: float, y1: float, size: int, words: int, work: Workspace, first_row: int, last_row: int
+) -> None:
     """Rows y0 to y1 of an edge that runs left of the image: the whole row gets its height."""
     low, high = min(y0, y1), max(y0, y1)
-    for row in range(max(0, int(np.floor(low))), min(size, int(np.ceil(high)))):
+    for row in range(max(first_row, int(np.floor(low))), min(last_row, int(np.ceil(high)))):
         height = min(high, row + 1.0) - max(low, float(row))
         if y1 > y0:
             height = -height
@@ -73,9 +75,9 @@ def _walk_left_of_image(y0: float, y1: float, size: int, words: int, work: Works
 @kernel
 def _walk_inside(
     x0: float, y0: float, dx: float, dy: float, t: float, t_stop: float,
-    edge: int, size: int, words: int, n: int, work: Workspace,
+    edge: int, size: int, words: int, n: int, work: Workspace, first_row: int, last_row: int,
 ) -> int:  # fmt: skip
-    """Cut the part t..t_stop of an edge, which lies inside the image, at the grid lines it crosses."""
+    """Cut the part t..t_stop of an edge, which lies inside the rows, at the grid lines it crosses."""
     step_x = 1 if dx > 0 else -1
     step_y = 1 if dy > 0 else -1
     x, y = x0 + t * dx, y0 + t * dy
@@ -86,7 +88,7 @@ def _walk_inside(
     if dy < 0 and y == row:
         row -= 1
     column = min(max(column, 0), size - 1)
-    row = min(max(row, 0), size - 1)
+    row = min(max(row, first_row), last_row - 1)
     per_x = 1.0 / dx if dx != 0.0 else np.inf
     per_y = 1.0 / dy if dy != 0.0 else np.inf
     next_x = (column + (dx > 0) - x0) * per_x if dx != 0.0 else np.inf
@@ -110,14 +112,26 @@ def _walk_inside(
             next_x = (column + (dx > 0) - x0) * per_x
         else:
             row += step_y
-            if row < 0 or row >= size:
+            if row < first_row or row >= last_row:
                 return n
             next_y = (row + (dy > 0) - y0) * per_y
 
 
 @kernel
-def walk_boundary(points: FloatArray, edges: IntArray, size: int, work: Workspace) -> None:
-    """Accumulate areas, heights and pieces of all directed boundary edges; `points` (V, 2) in the unit square."""
+def _crossing(row: int, y0: float, dy: float, size: int) -> float:
+    """Where along an edge the top of a row is: just where `_walk_inside` cuts it, but at the image's borders."""
+    return (row - y0) / dy if row == 0 or row == size else (row - y0) * (1.0 / dy)
+
+
+@kernel
+def walk_boundary(
+    points: FloatArray, edges: IntArray, size: int, work: Workspace, first_row: int, last_row: int
+) -> None:
+    """Accumulate areas, heights and pieces of all directed boundary edges; `points` (V, 2) in the unit square.
+
+    Only in rows first_row..last_row-1, where the numbers are those of the whole picture but for rounding, and hardly
+    ever that; 0 and R for all.
+    """
     words = (size + 63) >> 6
     n = 0
     for edge in range(edges.shape[0]):
@@ -126,11 +140,11 @@ def walk_boundary(points: FloatArray, edges: IntArray, size: int, work: Workspac
         dx, dy = x1 - x0, y1 - y0
         if dx == 0.0 and dy == 0.0:
             continue
-        t0, t1 = 0.0, 1.0  # the part between the top and the bottom of the image
+        t0, t1 = 0.0, 1.0  # the part between the top and the bottom of the rows
         if dy != 0.0:
-            ta, tb = -y0 / dy, (size - y0) / dy
+            ta, tb = _crossing(first_row, y0, dy, size), _crossing(last_row, y0, dy, size)
             t0, t1 = max(t0, min(ta, tb)), min(t1, max(ta, tb))
-        elif y0 < 0.0 or y0 > size:
+        elif y0 < first_row or y0 > last_row:
             continue
         if t0 >= t1:
             continue
@@ -144,17 +158,17 @@ def walk_boundary(points: FloatArray, edges: IntArray, size: int, work: Workspac
             continue
         ta, tb = min(ta, t1), max(tb, t0)
         if ta > t0 and x0 + 0.5 * (t0 + ta) * dx < 0.0:
-            _walk_left_of_image(y0 + t0 * dy, y0 + ta * dy, size, words, work)
+            _walk_left_of_image(y0 + t0 * dy, y0 + ta * dy, size, words, work, first_row, last_row)
         if tb > ta:
-            n = _walk_inside(x0, y0, dx, dy, ta, tb, edge, size, words, n, work)
+            n = _walk_inside(x0, y0, dx, dy, ta, tb, edge, size, words, n, work, first_row, last_row)
         if tb < t1 and tb >= ta and x0 + 0.5 * (tb + t1) * dx < 0.0:
-            _walk_left_of_image(y0 + tb * dy, y0 + t1 * dy, size, words, work)
+            _walk_left_of_image(y0 + tb * dy, y0 + t1 * dy, size, words, work, first_row, last_row)
 
 
 @kernel
 def coverage_image(points: FloatArray, edges: IntArray, size: int, work: Workspace, image: FloatArray) -> None:
     """Write the (R, R) coverage, unclamped (2 where faces overlap), into `image`."""
-    walk_boundary(points, edges, size, work)
+    walk_boundary(points, edges, size, work, 0, size)
     words = (size + 63) >> 6
     for row in range(size):
         total = 0.0
@@ -191,10 +205,19 @@ def overlap_counts(
 
     With `weight_sum` they are not counted but weighed, and `mask_sum` is of the weights, too.
     """
-    walk_boundary(points, edges, size, work)
+    return overlap_counts_in_rows(points, edges, size, mask, mask_sum, work, weight_sum, 0, size)
+
+
+@kernel
+def overlap_counts_in_rows(
+    points: FloatArray, edges: IntArray, size: int, mask: BoolArray, mask_sum: IntArray | FloatArray, work: Workspace,
+    weight_sum: FloatArray | None, first_row: int, last_row: int,
+) -> tuple[float, float]:  # fmt: skip
+    """`overlap_counts` of rows first_row..last_row-1 alone, at the cost of what lies in them."""
+    walk_boundary(points, edges, size, work, first_row, last_row)
     words = (size + 63) >> 6
     inside, filled = 0, 0
-    for row in range(size):
+    for row in range(first_row, last_row):
         total = 0.0
         column = 0
         for word in range(words):

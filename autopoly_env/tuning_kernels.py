@@ -10,12 +10,13 @@ import numpy as np
 
 from autopoly_env.arrays import BoolArray, FloatArray, IntArray
 from autopoly_env.jit import kernel
-from autopoly_env.raster_kernels import Workspace, overlap_counts
+from autopoly_env.raster_kernels import Workspace, overlap_counts_in_rows
 from autopoly_env.refit_kernels import Shape, defects
 
 _STEPS = (2.0, 1.0, 0.5, 0.25)  # pixels
 _N_DIRECTIONS = 8
 _N_ROUNDS = 4  # with one step, at most
+_LEAST_GAIN = 1e-12  # of the IoU; less is rounding of weights
 
 
 class Pixels(NamedTuple):
@@ -28,9 +29,30 @@ class Pixels(NamedTuple):
 
 
 @kernel
-def _iou(points: FloatArray, edges: IntArray, pixels: Pixels, work: Workspace) -> float:
+def _rows_around(v: int, image: int, points: FloatArray, edges: IntArray, margin: float, size: int) -> tuple[int, int]:
+    """The rows, first to last - 1, that edges at vertex v or at its image cross when these move by at most `margin`."""
+    low, high = points[v, 1], points[v, 1]
+    for edge in range(edges.shape[0]):
+        a, b = edges[edge, 0], edges[edge, 1]
+        if a == v or b == v or (image >= 0 and (a == image or b == image)):
+            low, high = min(low, points[a, 1], points[b, 1]), max(high, points[a, 1], points[b, 1])
+    first, last = int(np.floor((low - margin) * size)), int(np.ceil((high + margin) * size))
+    return min(max(first, 0), size - 1), max(min(last, size), 1)
+
+
+@kernel
+def _counts(
+    points: FloatArray, edges: IntArray, pixels: Pixels, work: Workspace, first: int, last: int
+) -> tuple[float, float]:
+    """What the mesh covers in rows first to last - 1: of the target, and in all."""
     size = pixels.mask.shape[0]
-    inside, filled = overlap_counts(points, edges, size, pixels.mask, pixels.mask_sum, work, pixels.weight_sum)
+    return overlap_counts_in_rows(
+        points, edges, size, pixels.mask, pixels.mask_sum, work, pixels.weight_sum, first, last
+    )
+
+
+@kernel
+def _iou(inside: float, filled: float, pixels: Pixels) -> float:
     union = filled + pixels.n_filled - inside
     return inside / union if union > 0 else 1.0
 
@@ -38,23 +60,26 @@ def _iou(points: FloatArray, edges: IntArray, pixels: Pixels, work: Workspace) -
 @kernel
 def tune(
     points: FloatArray, edges: IntArray, shape: Shape, images: IntArray, axis: float, pixels: Pixels, work: Workspace
-) -> float:
-    """Move `points` (V, 2), in place, by pattern search; return the IoU reached.
+) -> None:
+    """Move `points` (V, 2), in place, by pattern search on the IoU.
 
     `edges` (B, 2) are the boundary's. `images` (V,) holds each vertex's mirror image about x = `axis`, -1 for a vertex
     that has none, -2 for one that stays. No crossing and no flipped face comes about, and nothing leaves the picture.
+    A vertex changes the rows only that its edges cross, so those are all that is counted again.
     """
     size = pixels.mask.shape[0]
-    best = _iou(points, edges, pixels, work)
+    inside, filled = _counts(points, edges, pixels, work, 0, size)
     crossings, flipped = defects(points, shape)
     for step in _STEPS:
         for _round in range(_N_ROUNDS):
-            before = best
+            n_moved = 0
             for k in range(shape.boundary.shape[0]):
                 v = shape.boundary[k]
                 image = images[v]
                 if image == -2:
                     continue
+                first, last = _rows_around(v, image, points, edges, step / size, size)
+                part_inside, part_filled = _counts(points, edges, pixels, work, first, last)
                 for direction in range(_N_DIRECTIONS):
                     angle = 2.0 * np.pi * direction / _N_DIRECTIONS
                     x, y = points[v, 0], points[v, 1]
@@ -66,15 +91,19 @@ def tune(
                     points[v, 0], points[v, 1] = new_x, new_y
                     if image >= 0 and image != v:
                         points[image, 0], points[image, 1] = 2.0 * axis - new_x, new_y
-                    iou = _iou(points, edges, pixels, work)
-                    if iou > best:
+                    new_inside, new_filled = _counts(points, edges, pixels, work, first, last)
+                    gain_inside, gain_filled = new_inside - part_inside, new_filled - part_filled
+                    iou = _iou(inside + gain_inside, filled + gain_filled, pixels)
+                    if iou > _iou(inside, filled, pixels) + _LEAST_GAIN:
                         now_crossings, now_flipped = defects(points, shape)
                         if now_crossings <= crossings and now_flipped <= flipped:
-                            best = iou
+                            inside, filled = inside + gain_inside, filled + gain_filled
+                            n_moved += 1
+                            first, last = _rows_around(v, image, points, edges, step / size, size)
+                            part_inside, part_filled = _counts(points, edges, pixels, work, first, last)
                             continue
                     if image >= 0:
                         points[image, 0], points[image, 1] = other_x, other_y
                     points[v, 0], points[v, 1] = x, y
-            if best == before:
+            if n_moved == 0:
                 break
-    return best

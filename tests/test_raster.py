@@ -3,6 +3,7 @@
 import doctest
 from collections.abc import Iterator
 from fractions import Fraction
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -307,6 +308,23 @@ def test_overlap_counts__are_those_of_the_thresholded_images(resolution: int) ->
         rendered = coverage(mesh, resolution) >= 0.5
         assert (inside, filled) == ((rendered & target.mask).sum(), rendered.sum())
         assert_clean(resolution, len(batch.edges))
+
+
+@pytest.mark.parametrize("resolution", [1, 10, 64, 130])
+def test_overlap_counts_in_rows__are_those_of_the_rows(resolution: int) -> None:
+    target, rng = random_target(resolution), np.random.default_rng(0)
+    cuts = sorted({0, resolution, *rng.integers(resolution + 1, size=4).tolist()})
+    for mesh in (RING, hourglass(), RING.with_vertices(1.5 * RING.vertices - 0.4)):
+        batch = raster.batch_of([mesh])
+        work = raster.workspace(resolution, len(batch.edges))
+        rendered = coverage(mesh, resolution) >= 0.5
+        for first, last in pairwise(cuts):
+            inside, filled = raster_kernels.overlap_counts_in_rows(
+                batch.points, batch.edges, resolution, target.mask, target.mask_sum, work, None, first, last
+            )
+            band = slice(first, last)
+            assert (inside, filled) == ((rendered & target.mask)[band].sum(), rendered[band].sum())
+            assert_clean(resolution, len(batch.edges))
 
 
 # --- batches ---

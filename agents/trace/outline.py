@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -24,11 +24,10 @@ class Outline:
     @cached_property
     def loops(self) -> PolyMesh:
         """The rings as the faces of a mesh, holes wound backwards: its rendering is that of the shape."""
-        ends = np.cumsum([0, *(len(ring.points) for ring in self.rings)]).tolist()
-        cycles = tuple(tuple(range(a, b)) for a, b in pairwise(ends))
-        n, f = ends[-1], len(cycles)
+        cycles = _cycles(tuple(len(ring.points) for ring in self.rings))
+        n, f = cycles.n_vertices, cycles.n_faces
         points = np.concatenate([ring.points for ring in self.rings])
-        return PolyMesh(points, Topology(n, cycles), tuple(range(n)), tuple(range(f)), n, f)
+        return PolyMesh(points, cycles, tuple(range(n)), tuple(range(f)), n, f)
 
     @property
     def complexity(self) -> int:
@@ -71,6 +70,13 @@ class Outline:
         """The outline without a ring and without the holes in it."""
         gone = {index} | {k for k, ring in enumerate(self.rings) if ring.parent == index}
         return outline_of([ring for k, ring in enumerate(self.rings) if k not in gone], self.rings)
+
+
+@lru_cache(maxsize=4096)
+def _cycles(sizes: tuple[int, ...]) -> Topology:
+    """Rings of these sizes, as outlines by the thousand have them: what follows from it is computed once."""
+    ends = np.cumsum([0, *sizes]).tolist()
+    return Topology(ends[-1], tuple(tuple(range(a, b)) for a, b in pairwise(ends)))
 
 
 def outline_of(kept: Sequence[Ring], among: Sequence[Ring]) -> Outline:
