@@ -1,10 +1,17 @@
-"""Settings of every test run: one Numba thread a process, and property tests that neither race nor wander."""
+"""Settings of every test run: one Numba thread a process, property tests that neither race nor wander, no litter."""
 
 import os
 
 os.environ.setdefault("NUMBA_NUM_THREADS", "1")  # read when numba is imported, which no test has done yet
 
+import pytest
 from hypothesis import settings
 
 settings.register_profile("autopoly", deadline=None, derandomize="CI" in os.environ)
 settings.load_profile("autopoly")
+
+
+@pytest.fixture(autouse=True)
+def sb3_logs(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stable-Baselines3 makes a folder for logs that nobody asked for; let it be among the temporary ones."""
+    monkeypatch.setenv("SB3_LOGDIR", str(tmp_path_factory.getbasetemp() / "sb3"))
