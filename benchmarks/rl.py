@@ -4,7 +4,7 @@ import json
 import os
 import platform
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
@@ -35,6 +35,7 @@ N_PLAYS = 16  # sampled plays of a policy, the best of which counts
 RECTANGLE, GREEDY, RANDOM = "rectangle, refitted", "greedy", f"random, best of {N_RANDOM}"
 ONE_PASS, PARED = "one pass", "one pass, pared"
 BEST, EQUAL = f"best of {N_PLAYS}", "best at the refits of random"
+PLAYS = (ONE_PASS, PARED, BEST, EQUAL)  # of a policy
 _FILE_WIDTH = 150
 
 HELP = """Measure trained policies on unseen targets, and the speed of training.
@@ -42,7 +43,7 @@ HELP = """Measure trained policies on unseen targets, and the speed of training.
 \b
 Examples:
   python -m benchmarks.rl figures runs/a/policy.safetensors runs/b/policy.safetensors
-  python -m benchmarks.rl figures runs/a/policy.safetensors --n 20 --workers 2
+  python -m benchmarks.rl figures runs/a/policy.safetensors --n 20 --workers 2 --play "one pass" --play "best of 16"
   python -m benchmarks.rl throughput runs/maskable_ppo
   python -m benchmarks.rl curves "from nothing=runs/a,runs/b" "cloned=runs/c" --picture docs/pictures/learning.svg
 
@@ -221,6 +222,7 @@ class Row:
     complexity: float
     refits: float
     gap: Interval | None  # share of the way from the rectangle to greedy
+    gaps: list[float]  # that of each policy, in their order
     above_greedy: Interval | None
 
 
@@ -247,10 +249,23 @@ def rows_of(results: dict[Case, Found], cases: Sequence[Case]) -> list[Row]:
                     float(complexity.mean()),
                     float(refits.mean()),
                     None if ends else _share(total, low, high),
+                    _gaps(results, mine, method),
                     None if ends else bootstrap_mean(total - high),
                 )
             )
     return rows
+
+
+def _gaps(results: dict[Case, Found], cases: Sequence[Case], method: str) -> list[float]:
+    """The share of the gap of each policy, over the targets that it was measured on."""
+    low, high = _means(results, cases, RECTANGLE), _means(results, cases, GREEDY)
+    gaps = []
+    for weights in dict.fromkeys(case.weights for case in cases if case.weights and case.method == method):
+        found = _means(results, [case for case in cases if case.weights == weights], method)
+        rows = np.array([(low[t][0], high[t][0], found[t][0]) for t in found if t in low and t in high])
+        start, end, total = rows.mean(0)
+        gaps.append(float((total - start) / (end - start)))
+    return gaps
 
 
 def _means(results: dict[Case, Found], cases: Sequence[Case], method: str) -> dict[str, list[float]]:
@@ -277,14 +292,18 @@ def _share(total: np.ndarray, low: np.ndarray, high: np.ndarray) -> Interval:
     return Interval(float(share), *(float(end) for end in np.quantile(shares, (0.025, 0.975))))
 
 
-def cases_of(policies: Sequence[Path], n: int, results: dict[Case, Found]) -> Iterator[list[Case]]:
+def cases_of(
+    policies: Sequence[Path], n: int, results: dict[Case, Found], plays: Collection[str] = PLAYS
+) -> Iterator[list[Case]]:
     """What is to be measured: first what needs nothing else, then what gets the refits that random took."""
     targets = [target for kind in PRICES for target in made(kind, n)]
     plain = [Case(target, method) for method in (RECTANGLE, GREEDY, RANDOM) for target in targets]
     hashes = {str(path): read_policy_meta(path).sha256 for path in policies}
-    methods = (ONE_PASS, PARED, BEST)
+    methods = [play for play in PLAYS if play in plays and play != EQUAL]
     first = [*plain, *(Case(t, m, p, h) for p, h in hashes.items() for m in methods for t in targets)]
     yield first
+    if EQUAL not in plays:
+        return
     spent = {t: results[Case(t, RANDOM)].n_refits for t in targets if Case(t, RANDOM) in results}
     yield [*first, *(Case(t, EQUAL, p, h, spent[t]) for p, h in hashes.items() for t in targets if t in spent)]
 
@@ -293,14 +312,20 @@ def cases_of(policies: Sequence[Path], n: int, results: dict[Case, Found]) -> It
 def figures(
     policies: Annotated[list[Path], typer.Argument(metavar="POLICY", help=".safetensors, one for each seed.")],
     n: Annotated[int, typer.Option("--n", min=1, help="Targets of each kind.")] = 200,
+    play: Annotated[
+        list[str] | None, typer.Option(help="How the policies play; may be given again.", show_default="all ways")
+    ] = None,
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 1,
     records: Annotated[Path, typer.Option(help="File of results.")] = Path("out/rl/figures.jsonl"),
     as_json: Annotated[bool, typer.Option("--json", help="Rows as JSON, and no table.")] = False,
 ) -> int:
     """r_all on unseen targets: the rectangle, greedy, random, and the policies, played in several ways."""
-    console = _console()
+    console, plays = _console(), play or PLAYS
+    unknown = set(plays) - set(PLAYS)
+    if unknown:
+        raise ConfigError(f"--play {min(unknown)!r}: expected one of {', '.join(map(repr, PLAYS))}")
     known, well, cases = Records(records), True, []
-    for cases in cases_of(policies, n, known.results):
+    for cases in cases_of(policies, n, known.results, plays):
         well &= known.complete(cases, workers, lambda text: print(text, file=sys.stderr, flush=True))
     rows = rows_of(known.results, cases)
     if as_json:
@@ -309,7 +334,8 @@ def figures(
     else:
         title = f"mean r_all and 95 % interval, {n} targets of each kind, {len(policies)} seeds"
         table = Table(
-            "targets", "method", "r_all", "IoU", "V+E+F", "refits", "share of the gap", "above greedy", title=title
+            *("targets", "method", "r_all", "IoU", "V+E+F", "refits", "share of the gap", "of each", "above greedy"),
+            title=title,
         )
         for row in rows:
             table.add_row(
@@ -320,6 +346,7 @@ def figures(
                 f"{row.complexity:.1f}",
                 f"{row.refits:.0f}",
                 "" if row.gap is None else _shown(row.gap, ".0%"),
+                " ".join(f"{100.0 * share:.0f}" for share in row.gaps),
                 "" if row.above_greedy is None else _shown(row.above_greedy, "+.2f"),
             )
         console.print(table)

@@ -21,7 +21,7 @@ def found(r_all: float, n_refits: int = 5) -> Found:
 def test_share_of_the_gap__is_of_means_over_the_targets() -> None:
     totals = {rl.RECTANGLE: (60.0, 70.0), rl.GREEDY: (80.0, 90.0), rl.ONE_PASS: (75.0, 89.0)}
     results = {
-        Case(f"construction:{k}", method, weights): found(total)
+        Case(f"construction:{k}", method, weights): found(total + (weights == "b") - (weights == "a"))
         for method, both in totals.items()
         for k, total in enumerate(both)
         for weights in (("a", "b") if method == rl.ONE_PASS else ("",))
@@ -29,6 +29,7 @@ def test_share_of_the_gap__is_of_means_over_the_targets() -> None:
     rows = {row.method: row for row in rows_of(results, list(results))}
     policy = rows[rl.ONE_PASS]
     assert policy.gap is not None and policy.gap.mean == pytest.approx(17.0 / 20.0)
+    assert policy.gaps == pytest.approx([16.0 / 20.0, 18.0 / 20.0]) and rows[rl.GREEDY].gaps == []
     assert policy.gap.low == pytest.approx(0.75) and policy.gap.high == pytest.approx(0.95)
     assert policy.above_greedy is not None and policy.above_greedy.mean == pytest.approx(-3.0)
     assert rows[rl.GREEDY].gap is None and rows[rl.GREEDY].r_all.mean == 85.0
@@ -58,6 +59,8 @@ def test_figures__of_an_untrained_policy(tmp_path: Path, capsys: pytest.CaptureF
     assert 8 <= measured[rl.EQUAL].n_refits < 16
     assert rl.main(["figures", str(tmp_path / "none.safetensors"), "--records", str(tmp_path / "r.jsonl")]) == 2
     assert "no weights" in capsys.readouterr().err
+    assert rl.main(["figures", str(path), "--play", "twice"]) == 2
+    assert "'twice': expected one of 'one pass'" in capsys.readouterr().err
 
 
 def test_throughput_and_curves__are_read_from_logs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
