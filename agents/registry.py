@@ -14,7 +14,7 @@ from agents.guided.config import NfapMctsConfig, NfapPriorConfig
 from agents.options import validated
 from agents.oracle import OracleAgent, OracleConfig
 from agents.random_agent import RandomAgent, RandomConfig
-from agents.rl.agent import rl_agent, rl_prior
+from agents.rl.agent import PRIOR, rl_agent, rl_prior
 from agents.rl.config import RlConfig, RlPriorConfig
 from agents.search.config import PAPER, MctsConfig
 from agents.search.mcts import MctsAgent, PaperMctsAgent
@@ -39,7 +39,8 @@ def _nfap_prior(config: NfapPriorConfig) -> Agent:
 
 
 def _rl_prior(config: RlPriorConfig) -> Agent:
-    return rl_prior(config, [make_agent(name) for name in config.seeds])
+    options = {PRIOR: {"weights": config.weights}}
+    return rl_prior(config, [make_agent(name, **options.get(name, {})) for name in config.seeds])
 
 
 AGENTS: dict[str, tuple[Callable[[Any], Agent], Any]] = {

@@ -263,8 +263,9 @@ def _gaps(results: dict[Case, Found], cases: Sequence[Case], method: str) -> lis
     for weights in dict.fromkeys(case.weights for case in cases if case.weights and case.method == method):
         found = _means(results, [case for case in cases if case.weights == weights], method)
         rows = np.array([(low[t][0], high[t][0], found[t][0]) for t in found if t in low and t in high])
-        start, end, total = rows.mean(0)
-        gaps.append(float((total - start) / (end - start)))
+        if len(rows):
+            start, end, total = rows.mean(0)
+            gaps.append(float((total - start) / (end - start)))
     return gaps
 
 

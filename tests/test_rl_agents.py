@@ -129,8 +129,9 @@ def test_policy__stops_after_as_many_steps_as_it_was_trained_to_take(weights: st
 def test_rl_prior__searches_with_the_policys_odds(weights: str) -> None:
     agent = make_agent("rl-prior", weights=weights, n_simulations=4, patience=1)
     found = agent.solve(game(), Budget(refits=60))
+    played = make_agent("maskable-ppo", weights=weights).solve(game())
     assert agent.name == "rl-prior"
-    assert found.score.total >= game().final_score(game().initial().mesh).total
+    assert found.score.total >= played.score.total >= game().final_score(game().initial().mesh).total
 
 
 def test_rl_prior__knows_nothing_of_meshes_that_do_not_fit() -> None:

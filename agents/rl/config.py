@@ -87,9 +87,14 @@ class RlConfig:
 
 @dataclass(frozen=True)
 class RlPriorConfig(MctsConfig):
-    """`rl-prior`: the search with the policy's probabilities as priors, and exact refits."""
+    """`rl-prior`: from where the policy's own play ends, the search with its probabilities as priors and exact refits.
 
-    seeds: tuple[str, ...] = ()
+    As with `nfap-prior`, children are made one by one, and a step is committed soon.
+    """
+
+    seeds: tuple[str, ...] = ("maskable-ppo",)  # which plays with the same weights
+    n_simulations: int = 4
+    n_expanded: int = 1
     hop_patience: int = 0
     prior: Literal["rl"] = "rl"  # type: ignore[assignment]
     weights: str = ""  # a .safetensors file; empty for that of `maskable-ppo`
