@@ -86,12 +86,9 @@ def measure(case: Case) -> Found:
     track, meter = _METHODS[case.method](simulator, case)
     if track is None:
         solution = make_agent("greedy").solve(simulator, Budget())
-        n_refits = solution.stats.n_refits
     else:
         solution = finish(simulator, track.states(), meter, keep_steps=case.method != PARED)
-        n_refits = solution.stats.n_refits
-    score = solution.score
-    n_steps = len(solution.sequence.steps)
+    score, n_refits, n_steps = solution.score, solution.stats.n_refits, len(solution.sequence.steps)
     return Found(score.total, score.iou, score.complexity, score.self_intersections, n_refits, n_steps)
 
 
@@ -226,6 +223,9 @@ class Row:
     above_greedy: Interval | None
 
 
+_ByTarget = dict[str, list[float]]  # what is shown, by target
+
+
 def rows_of(results: dict[Case, Found], cases: Sequence[Case]) -> list[Row]:
     """The table; several policies' results on a target are averaged."""
     rows = []
@@ -249,27 +249,27 @@ def rows_of(results: dict[Case, Found], cases: Sequence[Case]) -> list[Row]:
                     float(complexity.mean()),
                     float(refits.mean()),
                     None if ends else _share(total, low, high),
-                    _gaps(results, mine, method),
+                    _gaps(results, mine, method, values[RECTANGLE], values[GREEDY]),
                     None if ends else bootstrap_mean(total - high),
                 )
             )
     return rows
 
 
-def _gaps(results: dict[Case, Found], cases: Sequence[Case], method: str) -> list[float]:
+def _gaps(
+    results: dict[Case, Found], cases: Sequence[Case], method: str, low: _ByTarget, high: _ByTarget
+) -> list[float]:
     """The share of the gap of each policy, over the targets that it was measured on."""
-    low, high = _means(results, cases, RECTANGLE), _means(results, cases, GREEDY)
     gaps = []
     for weights in dict.fromkeys(case.weights for case in cases if case.weights and case.method == method):
         found = _means(results, [case for case in cases if case.weights == weights], method)
-        rows = np.array([(low[t][0], high[t][0], found[t][0]) for t in found if t in low and t in high])
+        rows = np.array([(found[t][0], low[t][0], high[t][0]) for t in found if t in low and t in high])
         if len(rows):
-            start, end, total = rows.mean(0)
-            gaps.append(float((total - start) / (end - start)))
+            gaps.append(float(_share_of_gap(*rows.mean(0))))
     return gaps
 
 
-def _means(results: dict[Case, Found], cases: Sequence[Case], method: str) -> dict[str, list[float]]:
+def _means(results: dict[Case, Found], cases: Sequence[Case], method: str) -> _ByTarget:
     """By target: means over the policies of r_all, IoU, complexity and refits."""
     found: dict[str, list[Found]] = {}
     for case in cases:
@@ -288,9 +288,13 @@ def _share(total: np.ndarray, low: np.ndarray, high: np.ndarray) -> Interval:
     """Mean (total - low) over mean (high - low), with the bootstrap's interval: targets are drawn, not their shares."""
     rng = np.random.default_rng(0)
     draws = rng.integers(len(total), size=(2000, len(total)))
-    shares = (total[draws].mean(1) - low[draws].mean(1)) / (high[draws].mean(1) - low[draws].mean(1))
-    share = (total.mean() - low.mean()) / (high.mean() - low.mean())
+    shares = _share_of_gap(total[draws].mean(1), low[draws].mean(1), high[draws].mean(1))
+    share = _share_of_gap(total.mean(), low.mean(), high.mean())
     return Interval(float(share), *(float(end) for end in np.quantile(shares, (0.025, 0.975))))
+
+
+def _share_of_gap(total: Any, low: Any, high: Any) -> Any:
+    return (total - low) / (high - low)
 
 
 def cases_of(

@@ -29,9 +29,9 @@ class RlAgent(Agent):
     def act(self, simulator: Simulator, state: State) -> Decision:
         """The likeliest action, or one that is drawn."""
         config = self._config
-        action = self._player.ranked(simulator, state, self._rng(0, state.step), config.temperature)[0]
         if state.step >= self._player.rules.max_steps:
             return Decision(STOP)
+        action = self._player.ranked(simulator, state, self._rng(0, state.step), config.temperature)[0]
         return Decision(action, self._player.probabilities(simulator, state, config.temperature))
 
     def _search(self, simulator: Simulator, track: Track, meter: Meter) -> Iterator[Track]:

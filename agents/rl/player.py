@@ -10,9 +10,9 @@ import numpy as np
 import torch
 
 from agents.base import Meter, Track
-from agents.rl.network import MeshNet, observer_of
+from agents.rl.network import NEVER, MeshNet, observer_of
 from autopoly_env.actions import STOP, Action, ActionCodec
-from autopoly_env.arrays import BoolArray, ByteArray, FloatArray
+from autopoly_env.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from autopoly_env.errors import IllegalActionError
 from autopoly_env.observation import Observation
 from autopoly_env.silhouette import Silhouette
@@ -81,18 +81,15 @@ class Player:
         """
         if state.step >= self.rules.max_steps:
             return [STOP]
-        logits = self.logits([simulator], [state])[0]
-        legal = np.flatnonzero(self.legal_mask(simulator, state))
-        odds = logits[legal]
+        legal, odds = self._legal_logits(simulator, state)
         if rng is not None:
             odds = odds / temperature + rng.gumbel(size=len(odds))  # whose order is that of drawing without returning
         return [self.codec.decode(int(legal[k])) for k in np.argsort(-odds, kind="stable")]
 
     def probabilities(self, simulator: Simulator, state: State, temperature: float = 1.0) -> dict[Action, float]:
         """The probability of each legal action, STOP first."""
-        logits = self.logits([simulator], [state])[0]
-        legal = np.flatnonzero(self.legal_mask(simulator, state))
-        odds = np.exp((logits[legal] - logits[legal].max()) / temperature)
+        legal, logits = self._legal_logits(simulator, state)
+        odds = np.exp((logits - logits.max()) / temperature)
         odds /= odds.sum()
         return {self.codec.decode(int(k)): float(p) for k, p in zip(legal, odds, strict=True)}
 
@@ -125,6 +122,12 @@ class Player:
             except IllegalActionError:  # a hole that fits nowhere
                 continue
         return None
+
+    def _legal_logits(self, simulator: Simulator, state: State) -> tuple[IntArray, FloatArray]:
+        """The numbers of the legal actions, and their logits."""
+        logits = self.logits([simulator], [state])[0]
+        legal = np.flatnonzero(logits > 0.5 * NEVER)
+        return legal, logits[legal]
 
     def _indices(self, actions: Sequence[Action]) -> Iterator[int]:
         """The numbers of the actions that have one."""
