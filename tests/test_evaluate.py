@@ -257,7 +257,7 @@ def test_kill__at_any_moment_loses_and_repeats_nothing(run: Run) -> None:
 
 
 def test_ctrl_c__leaves_a_run_to_go_on_with() -> None:
-    Path("tiny.yaml").write_text(SUITE.replace("n: 3", "n: 200"))
+    Path("tiny.yaml").write_text(SUITE.replace("n: 3", "n: 2000"))
     command = [sys.executable, "-m", "training.evaluate", "tiny.yaml", "--out", "out"]
     env = os.environ | {"PYTHONPATH": str(ROOT)}
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=env, start_new_session=True) as process:
