@@ -15,10 +15,10 @@ from agents.base import Budget, Meter, Progress, Solution, finish
 from agents.trace.rings import signed_area, trace_rings
 from agents.versions import Version, first_settled, neighbours, total_of, version_of
 from autopoly_env.arrays import FloatArray
+from autopoly_env.compute import map_threads
 from autopoly_env.errors import AutoPolyError, SequenceError
 from autopoly_env.follower import Follower, Taken
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.parallel import map_threads
 from autopoly_env.raster import coverage
 from autopoly_env.refit import FROM_AFAR, LOCAL, THOROUGH, RefitConfig, refit
 from autopoly_env.score import Score

@@ -15,9 +15,9 @@ from agents.registry import AGENTS, make_agent
 from agents.solve_files import OVERVIEW, RESULTS, Overview, Result, write_results
 from agents.solve_guidance import NO_WISHES, Wishes
 from agents.solve_report import Report
+from autopoly_env.compute import n_threads
 from autopoly_env.errors import AutoPolyError, ConfigError
 from autopoly_env.export import save_png
-from autopoly_env.parallel import n_threads
 from autopoly_env.score import ScoreWeights
 from autopoly_env.silhouette import Silhouette, load_silhouette
 from autopoly_env.simulator import Simulator

@@ -12,7 +12,7 @@ import numpy as np
 from numba.cpython.unsafe.numbers import trailing_zeros
 
 from autopoly_env.arrays import FloatArray, IntArray
-from autopoly_env.jit import kernel
+from autopoly_env.compute import kernel
 from autopoly_env.raster_kernels import (
     AREA,
     COVER,

@@ -6,7 +6,7 @@ Letters: R pixels a side, L regions of connected disagreement, V vertices, B dir
 import numpy as np
 
 from autopoly_env.arrays import FloatArray, IntArray
-from autopoly_env.jit import kernel
+from autopoly_env.compute import kernel
 
 MASS, FAR_X, FAR_Y, LOW, HIGH, DEPTH = range(6)
 AREA, DEEP_X, DEEP_Y, RADIUS, MEAN_X, MEAN_Y, VAR_X, VAR_Y, COV_XY = range(9)

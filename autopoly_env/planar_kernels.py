@@ -8,7 +8,7 @@ replay on another machine gives the same bits.
 import numpy as np
 
 from autopoly_env.arrays import BoolArray, FloatArray, IntArray
-from autopoly_env.jit import kernel
+from autopoly_env.compute import kernel
 
 TOUCH = 1e-9  # segments nearer than this (unit square) count as touching
 

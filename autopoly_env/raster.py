@@ -15,9 +15,9 @@ import numpy as np
 
 from autopoly_env import derivative_kernels, raster_kernels
 from autopoly_env.arrays import FloatArray, IntArray
+from autopoly_env.compute import map_threads, n_threads
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.parallel import map_threads, n_threads
 from autopoly_env.raster_kernels import Workspace
 from autopoly_env.silhouette import Target
 

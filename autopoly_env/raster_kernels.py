@@ -14,7 +14,7 @@ import numpy as np
 from numba.cpython.unsafe.numbers import trailing_zeros
 
 from autopoly_env.arrays import BoolArray, FloatArray, IntArray, UIntArray
-from autopoly_env.jit import kernel
+from autopoly_env.compute import kernel
 
 
 class Workspace(NamedTuple):

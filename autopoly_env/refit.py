@@ -19,9 +19,9 @@ import numpy as np
 
 from autopoly_env import refit_kernels
 from autopoly_env.arrays import BoolArray, IntArray
+from autopoly_env.compute import map_threads
 from autopoly_env.errors import MeshError
 from autopoly_env.mesh import PolyMesh, Topology
-from autopoly_env.parallel import map_threads
 from autopoly_env.raster import workspace
 from autopoly_env.refit_kernels import Picture, Settings, Shape, Ties
 from autopoly_env.silhouette import Silhouette, Target

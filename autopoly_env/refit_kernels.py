@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from autopoly_env.arrays import BoolArray, FloatArray, IntArray
+from autopoly_env.compute import kernel
 from autopoly_env.derivative_kernels import half_gradient, normal_equations
 from autopoly_env.geometry_kernels import count_crossings, face_areas
-from autopoly_env.jit import kernel
 from autopoly_env.raster_kernels import Workspace
 
 _MIN_FACE_AREA = 1e-9

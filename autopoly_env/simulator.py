@@ -14,6 +14,7 @@ import shapely
 
 from autopoly_env.actions import STOP, Action, legal_actions
 from autopoly_env.arrays import BoolArray
+from autopoly_env.compute import Job, Routine, map_threads, run
 from autopoly_env.edits import Choice
 from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.guidance import Guidance, importance_settings
@@ -22,10 +23,8 @@ from autopoly_env.lesson import share_moved
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.mirror import Beginning, Halfway, mirrored_starts
 from autopoly_env.operators import preset
-from autopoly_env.parallel import map_threads
 from autopoly_env.placement import Disagreement, defects_of, leaves_outline_alone, starts
 from autopoly_env.refit import FROM_AFAR, LOCAL, THOROUGH, RefitConfig, RefitTarget, holding, refit
-from autopoly_env.routines import Job, Routine, run
 from autopoly_env.score import Score, ScoreWeights, score
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import Silhouette

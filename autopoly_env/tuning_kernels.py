@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from autopoly_env.arrays import BoolArray, FloatArray, IntArray
-from autopoly_env.jit import kernel
+from autopoly_env.compute import kernel
 from autopoly_env.raster_kernels import Workspace, overlap_counts_in_rows
 from autopoly_env.refit_kernels import Shape, defects
 

@@ -8,10 +8,10 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from autopoly_env.arrays import IntArray
+from autopoly_env.compute import Routine, run_all
 from autopoly_env.env import AutoPolyEnv, target_source
 from autopoly_env.errors import ConfigError, EpisodeError, IllegalActionError
 from autopoly_env.observation import Observation
-from autopoly_env.routines import Routine, run_all
 
 Start = tuple[Observation, dict[str, Any]]
 
@@ -20,7 +20,7 @@ class AutoPolyVectorEnv(SyncVectorEnv):
     """Gymnasium's SyncVectorEnv over `num_envs` AutoPolyEnvs, except that it steps all of them at once.
 
     The refits, more than half of a step, run in kernels without the GIL: threads do them, as many as
-    `autopoly_env.parallel.n_threads()` says, while the calling thread does the rest. Seeds, autoreset, `reset_mask`,
+    `autopoly_env.compute.n_threads()` says, while the calling thread does the rest. Seeds, autoreset, `reset_mask`,
     infos, `call`, `get_attr` and every number that comes out are SyncVectorEnv's.
 
     `autoreset_mode` is a `gymnasium.vector.AutoresetMode` or its value, `settings` are AutoPolyEnv's arguments. Raises

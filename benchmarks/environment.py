@@ -12,8 +12,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from autopoly_env.compute import set_threads
 from autopoly_env.env import AutoPolyEnv, EnvState
-from autopoly_env.parallel import set_threads
 from benchmarks.report import Must, Row, faster, not_measured
 from benchmarks.timing import least_seconds
 

@@ -16,7 +16,7 @@ from agents.registry import AGENTS, make_agent
 from agents.search.config import MctsConfig
 from autopoly_env import refit_kernels, tuning
 from autopoly_env.arrays import FloatArray
-from autopoly_env.parallel import set_threads
+from autopoly_env.compute import set_threads
 from benchmarks.report import Must, Row, not_measured
 from benchmarks.search_cases import Case, Results, made, measure, simulator_of, with_options
 from training.report.statistics import Interval, bootstrap_mean

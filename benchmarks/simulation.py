@@ -4,7 +4,7 @@ import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from autopoly_env.parallel import set_threads
+from autopoly_env.compute import set_threads
 from autopoly_env.silhouette import load_silhouette
 from autopoly_env.simulator import Simulator, State
 from benchmarks.report import Must, Row, not_measured

@@ -8,18 +8,18 @@ from pathlib import Path
 
 import pytest
 
-from autopoly_env import jit, parallel
+from autopoly_env.compute import jit, map_threads, n_threads, parallel, set_threads
 from autopoly_env.errors import ConfigError
-from autopoly_env.parallel import map_threads, n_threads, set_threads
 
-PACKAGE = Path(jit.__file__).parent
-INNER = "from autopoly_env.jit import kernel\n\n@kernel\ndef factor() -> float:\n    return {factor}\n"
+PACKAGE = Path(jit.__file__).parent.parent
+INNER = "from autopoly_env.compute.jit import kernel\n\n@kernel\ndef factor() -> float:\n    return {factor}\n"
 OUTER = (
-    "from autopoly_env.inner_kernels import factor\nfrom autopoly_env.jit import kernel\n\n"
+    "from autopoly_env.inner.inner_kernels import factor\nfrom autopoly_env.compute.jit import kernel\n\n"
     "@kernel\ndef scaled(x: float) -> float:\n    return factor() * x\n"
 )
-CALL = "from autopoly_env.outer_kernels import scaled; print(scaled(10.0))"
-TWICE = "from autopoly_env.outer_kernels import scaled; print(scaled(10.0), scaled(10))"
+CALL = "from autopoly_env.outer.outer_kernels import scaled; print(scaled(10.0))"
+TWICE = "from autopoly_env.outer.outer_kernels import scaled; print(scaled(10.0), scaled(10))"
+FROM_OUTSIDE = "from players.moves.outer_kernels import scaled; print(scaled(10.0))"
 QUIET, LOUD = 0, 1  # announcements
 
 
@@ -38,13 +38,14 @@ def run_python(code: str, package_parent: Path, **variables: str) -> tuple[str, 
 
 @pytest.fixture
 def package(tmp_path: Path) -> Path:
-    """A package of two tiny kernel files, one of which inlines the other, and the real `jit`."""
+    """A package of two tiny kernel files, one of which inlines the other from another folder, and the real `jit`."""
     folder = tmp_path / "autopoly_env"
-    folder.mkdir()
-    shutil.copy(PACKAGE / "jit.py", folder)
-    (folder / "__init__.py").write_text("")
-    (folder / "inner_kernels.py").write_text(INNER.format(factor=2.0))
-    (folder / "outer_kernels.py").write_text(OUTER)
+    for room in (folder, folder / "compute", folder / "inner", folder / "outer"):
+        room.mkdir()
+        (room / "__init__.py").write_text("")
+    shutil.copy(PACKAGE / "compute" / "jit.py", folder / "compute")
+    (folder / "inner" / "inner_kernels.py").write_text(INNER.format(factor=2.0))
+    (folder / "outer" / "outer_kernels.py").write_text(OUTER)
     return folder
 
 
@@ -52,9 +53,24 @@ def test_second_process__does_not_compile_until_a_kernel_file_changes(package: P
     cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     assert run_python(CALL, tmp_path, **cache) == ("20.0", LOUD)
     assert run_python(CALL, tmp_path, **cache) == ("20.0", QUIET)
-    (package / "inner_kernels.py").write_text(INNER.format(factor=3.0))
-    assert run_python(CALL, tmp_path, **cache) == ("30.0", LOUD)  # although outer_kernels.py is the same
+    (package / "inner" / "inner_kernels.py").write_text(INNER.format(factor=3.0))
+    assert run_python(CALL, tmp_path, **cache) == ("30.0", LOUD)  # although nothing in its own folder has changed
     assert run_python(CALL, tmp_path, **cache) == ("30.0", QUIET)
+
+
+def test_kernel_of_another_package__is_compiled_anew_when_one_that_it_inlines_changes(
+    package: Path, tmp_path: Path
+) -> None:
+    cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    moves = tmp_path / "players" / "moves"
+    moves.mkdir(parents=True)
+    for room in (moves, moves.parent):
+        (room / "__init__.py").write_text("")
+    (moves / "outer_kernels.py").write_text(OUTER)
+    assert run_python(FROM_OUTSIDE, tmp_path, **cache) == ("20.0", LOUD)
+    assert run_python(FROM_OUTSIDE, tmp_path, **cache) == ("20.0", QUIET)
+    (package / "inner" / "inner_kernels.py").write_text(INNER.format(factor=3.0))
+    assert run_python(FROM_OUTSIDE, tmp_path, **cache) == ("30.0", LOUD)
 
 
 def test_damaged_cache__is_replaced(package: Path, tmp_path: Path) -> None:
@@ -71,7 +87,8 @@ def test_damaged_cache__is_replaced(package: Path, tmp_path: Path) -> None:
 def test_unwritable_cache__means_compiling_in_every_process_and_saying_so(package: Path, tmp_path: Path) -> None:
     """No folder can be made below a regular file, not even by root."""
     (tmp_path / "file").touch()
-    (package / "__pycache__").touch()
+    for room in ("inner", "outer"):
+        (package / room / "__pycache__").touch()
     nowhere = str(tmp_path / "file" / "cache")
     variables = {"NUMBA_CACHE_DIR": nowhere, "HOME": nowhere, "XDG_CACHE_HOME": nowhere}
     for _ in range(2):
@@ -117,7 +134,7 @@ def test_cache__never_shows_the_code_of_an_older_source(tmp_path: Path, monkeypa
 
 
 def test_kernels__all_go_through_this_cache() -> None:
-    rooms = [PACKAGE, *(PACKAGE.parent / room for room in ("agents", "training"))]
+    rooms = [PACKAGE.parent / room for room in ("autopoly_env", "agents", "training")]
     sources = [path for room in rooms for path in room.rglob("*.py") if path.name != "jit.py"]
     assert not [path.name for path in sources if "njit" in path.read_text()]
     assert not [path.name for path in sources if "@kernel" in path.read_text() and "_kernels" not in path.name]
@@ -170,7 +187,7 @@ def test_map_threads__keeps_the_order_and_passes_errors_on(threads: int) -> None
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="nothing forks here")
 def test_map_threads__works_in_a_forked_child_of_a_process_that_has_used_it(tmp_path: Path) -> None:
     code = (
-        "import os, signal; from autopoly_env.parallel import map_threads; map_threads(str, range(9));"
+        "import os, signal; from autopoly_env.compute.parallel import map_threads; map_threads(str, range(9));"
         "child = os.fork(); signal.alarm(10);"  # so that neither hangs
         "child or os._exit(map_threads(abs, [0, 0, 7])[2]);"
         "print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))"

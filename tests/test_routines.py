@@ -7,8 +7,7 @@ from typing import Any
 
 import pytest
 
-from autopoly_env.parallel import set_threads
-from autopoly_env.routines import Routine, run, run_all
+from autopoly_env.compute import Routine, run, run_all, set_threads
 
 
 @pytest.fixture(params=[1, 2, 3], ids=lambda n: f"{n} threads")

@@ -13,10 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from autopoly_env.actions import STOP, Action
+from autopoly_env.compute import set_threads
 from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.mesh import PolyMesh, is_valid
 from autopoly_env.operators import OPERATORS, n_elements
-from autopoly_env.parallel import set_threads
 from autopoly_env.placement import defects_of
 from autopoly_env.refit import LOCAL, refit
 from autopoly_env.score import ScoreWeights, score

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from autopoly_env.compute import set_threads
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.parallel import set_threads
 from autopoly_env.raster import loss_and_gradient
 from autopoly_env.silhouette import Target
 from tests.shapes import frame, hourglass, loop, polygon, star

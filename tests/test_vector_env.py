@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
 
+from autopoly_env.compute import set_threads
 from autopoly_env.errors import ConfigError, EpisodeError, IllegalActionError
-from autopoly_env.parallel import set_threads
 from autopoly_env.vector_env import AutoPolyVectorEnv
 
 NAME = "autopoly_env:AutoPoly-v0"

@@ -6,7 +6,7 @@ from typing import NamedTuple
 from agents.trace.outline import Outline
 from agents.trace.reach import Reach
 from agents.trace.rings import trace_rings
-from autopoly_env.parallel import map_threads
+from autopoly_env.compute import map_threads
 from autopoly_env.refit import RefitConfig
 from autopoly_env.score import Score
 from autopoly_env.simulator import Simulator

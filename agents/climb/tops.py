@@ -3,8 +3,8 @@
 from agents.climb.hill import Hill, Place, total_of
 from agents.trace.agent import build_best
 from agents.trace.outline import outline_of_mesh
+from autopoly_env.compute import map_threads
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.parallel import map_threads
 from autopoly_env.simulator import State
 
 _N_KEPT = 6  # which of them is the best shows when they are refitted more finely

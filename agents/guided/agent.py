@@ -11,8 +11,8 @@ from agents.extras import require
 from agents.guided.config import NfapMctsConfig, NfapPriorConfig
 from agents.search.mcts import MctsAgent
 from autopoly_env.actions import STOP
+from autopoly_env.compute import n_threads
 from autopoly_env.errors import ConfigError
-from autopoly_env.parallel import n_threads
 from autopoly_env.simulator import Simulator, State
 
 if TYPE_CHECKING:

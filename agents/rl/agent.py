@@ -10,7 +10,7 @@ from agents.extras import require
 from agents.rl.config import RlConfig, RlPriorConfig
 from agents.search.mcts import MctsAgent
 from autopoly_env.actions import STOP
-from autopoly_env.parallel import n_threads
+from autopoly_env.compute import n_threads
 from autopoly_env.simulator import Simulator, State
 
 if TYPE_CHECKING:

@@ -16,11 +16,10 @@ from stable_baselines3.common.vec_env import SubprocVecEnv, VecEnv
 
 from agents.rl.config import Rules
 from agents.rl.player import observation_of
+from autopoly_env.compute import Routine, run, run_all, set_threads
 from autopoly_env.env import AutoPolyEnv, EnvState
 from autopoly_env.errors import ConfigError
 from autopoly_env.observation import Observation
-from autopoly_env.parallel import set_threads
-from autopoly_env.routines import Routine, run, run_all
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.targets import ConstructionTargets, TargetSource, make_targets
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from autopoly_env.arrays import BoolArray, FloatArray, IntArray
-from autopoly_env.jit import kernel
+from autopoly_env.compute import kernel
 
 
 @kernel

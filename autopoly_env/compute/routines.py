@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from typing import Any, Generic, TypeVar
 
-from autopoly_env.parallel import map_threads, n_threads
+from autopoly_env.compute.parallel import map_threads, n_threads
 
 _Result = TypeVar("_Result")
 Job = Callable[[], Any]

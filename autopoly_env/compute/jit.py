@@ -1,8 +1,8 @@
 """`kernel`: compile a numeric function with Numba once per machine, and say so the one time that it takes a while.
 
 Numba's own on-disk cache is stamped with one source file, so a kernel that inlines a kernel of another file goes
-stale when that other file changes. Here every kernel is stamped with all ``*_kernels.py`` files of this package and
-of its own folder.
+stale when that other file changes. Here every kernel is stamped with all ``*_kernels.py`` files of this
+package and of its own, in whichever folder they lie.
 """
 
 import contextlib
@@ -21,13 +21,21 @@ _announced = False
 
 
 @functools.cache
-def _kernel_sources_stamp(folder: Path) -> bytes:
-    """Hash of this file, which says how to compile, and of every kernel file of this package and of `folder`."""
+def _kernel_sources_stamp(package: Path) -> bytes:
+    """Hash of this file, which says how to compile, and of every kernel file of its package and of `package`."""
     digest = hashlib.sha256(Path(__file__).read_bytes())
-    for home in sorted({Path(__file__).parent, folder}):
-        for path in sorted(home.glob("*_kernels.py")):
+    for home in sorted({_package_of(Path(__file__)), package}):
+        for path in sorted(home.rglob("*_kernels.py")):
             digest.update(path.read_bytes())
     return digest.digest()
+
+
+def _package_of(source: Path) -> Path:
+    """The folder of the outermost package that a source file belongs to; its own, where that is no package."""
+    folder = source.parent
+    while (folder.parent / "__init__.py").exists():
+        folder = folder.parent
+    return folder
 
 
 def _announce_compilation() -> None:
@@ -75,7 +83,7 @@ class _KernelCache(FunctionCache):
         self._cache_file = _CacheFile(
             cache_path=self._cache_path,
             filename_base=self._impl.filename_base,
-            source_stamp=_kernel_sources_stamp(Path(inspect.getfile(py_func)).parent),
+            source_stamp=_kernel_sources_stamp(_package_of(Path(inspect.getfile(py_func)))),
         )
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
