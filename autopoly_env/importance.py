@@ -4,8 +4,7 @@ import numpy as np
 
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import ConfigError, SilhouetteError
-from autopoly_env.image_loading import ROUNDING, ImageSource, read_picture
-from autopoly_env.silhouette import WEIGHT_STEPS, Silhouette, area_means
+from autopoly_env.silhouette import ROUNDING, WEIGHT_STEPS, ImageSource, Silhouette, area_means, read_picture
 
 ImportanceSource = ImageSource  # read as grey levels; an alpha channel is not looked at
 

@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.status import Status
 
 from autopoly_env.errors import SilhouetteError
-from autopoly_env.image_files import find_images
+from autopoly_env.silhouette import find_images
 from benchmarks import report
 from benchmarks.report import Record, Row
 

@@ -16,7 +16,7 @@ from rich.status import Status
 from agents.command import run_command
 from autopoly_env.errors import ConfigError, SilhouetteError
 from autopoly_env.files import write_atomically
-from autopoly_env.image_files import find_images
+from autopoly_env.silhouette import find_images
 from benchmarks import report, search_rows
 from benchmarks.curve_picture import draw_curves
 from benchmarks.report import Row

@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import ClassVar, Literal
 
 from autopoly_env.errors import ConfigError, SilhouetteError
-from autopoly_env.image_files import find_images
 from autopoly_env.sequence import ConstructionSequence
-from autopoly_env.silhouette import Silhouette, load_silhouette
+from autopoly_env.silhouette import Silhouette, find_images, load_silhouette
 from autopoly_env.targets import ConstructionTargets, ObjectTargets, split_seed
 from autopoly_env.targets.obj_file import read_obj
 from autopoly_env.targets.projection import silhouette_of

@@ -16,7 +16,8 @@ import numpy as np
 from PIL import Image
 
 from autopoly_env.errors import AutoPolyError, SilhouetteError
-from autopoly_env.silhouette import BoolArray, Silhouette
+from autopoly_env.silhouette import Silhouette
+from autopoly_env.silhouette.silhouette import BoolArray
 from training.records import Outcome, Record
 from training.report.axes import number
 from training.report.charts import colour_class, marker

@@ -12,9 +12,9 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image, UnidentifiedImageError
 
+from autopoly_env.arrays import Float32Array
 from autopoly_env.errors import SilhouetteError
 
-FloatArray = npt.NDArray[np.float32]
 ImageSource = str | os.PathLike[str] | IO[bytes] | Image.Image | npt.NDArray[Any]
 
 MAX_SIDE = 2048  # pixels; longer pictures are reduced by an integer factor
@@ -46,8 +46,8 @@ class Picture:
     channel where there is one, and a boolean array itself. `label` names the source in errors.
     """
 
-    grey: FloatArray | None
-    opacity: FloatArray | None
+    grey: Float32Array | None
+    opacity: Float32Array | None
     name: str
     label: str
     notes: tuple[str, ...]
@@ -153,7 +153,7 @@ def _read_array(array: npt.NDArray[Any]) -> Picture:
     return Picture(grey, opacity, "silhouette", label, tuple(notes))
 
 
-def _array_levels(array: npt.NDArray[Any]) -> FloatArray:
+def _array_levels(array: npt.NDArray[Any]) -> Float32Array:
     """Grey (and alpha) of some rows of an array: (1 or 2, rows, W) float32 in 0..1."""
     levels = array.astype(np.float32) / np.float32(255 if array.dtype == np.uint8 else 1)
     if levels.ndim == 2:
@@ -163,7 +163,7 @@ def _array_levels(array: npt.NDArray[Any]) -> FloatArray:
     return np.stack([grey, *np.moveaxis(levels[..., n_colours:], 2, 0)])
 
 
-def _pillow_levels(image: Image.Image, top: int, end: int) -> FloatArray:
+def _pillow_levels(image: Image.Image, top: int, end: int) -> Float32Array:
     """Grey (and alpha) of rows top..end of a loaded image: (1 or 2, rows, W) float32, in 0..1 unless it is
     deep."""
     strip = image.crop((0, top, image.width, end))
@@ -177,7 +177,9 @@ def _pillow_levels(image: Image.Image, top: int, end: int) -> FloatArray:
     return np.stack([np.asarray(band, dtype=np.float32) for band in bands]) / np.float32(255)
 
 
-def _reduced(levels_of_rows: Callable[[int, int], FloatArray], width: int, height: int) -> tuple[FloatArray, list[str]]:
+def _reduced(
+    levels_of_rows: Callable[[int, int], Float32Array], width: int, height: int
+) -> tuple[Float32Array, list[str]]:
     """Read strip by strip and average blocks of factor x factor pixels: (C, H, W) with sides <= MAX_SIDE,
     notes."""
     factor = -(-max(width, height) // MAX_SIDE)
@@ -190,7 +192,7 @@ def _reduced(levels_of_rows: Callable[[int, int], FloatArray], width: int, heigh
     return levels, [f"reduced from {width}x{height} to {size} (blocks of {factor}x{factor} averaged)"]
 
 
-def _block_means(levels: FloatArray, factor: int) -> FloatArray:
+def _block_means(levels: Float32Array, factor: int) -> Float32Array:
     """Means over factor x factor blocks of (C, H, W); the last row and column of blocks may be smaller."""
     if factor == 1:
         return levels
@@ -202,7 +204,7 @@ def _block_means(levels: FloatArray, factor: int) -> FloatArray:
     return levels
 
 
-def _stretched(levels: FloatArray, label: str, notes: list[str]) -> FloatArray:
+def _stretched(levels: Float32Array, label: str, notes: list[str]) -> Float32Array:
     """Levels of unknown range, scaled so that they span 0..1."""
     low, high = float(levels.min()), float(levels.max())
     if not np.isfinite(high - low):
@@ -213,7 +215,7 @@ def _stretched(levels: FloatArray, label: str, notes: list[str]) -> FloatArray:
     return (levels - np.float32(low)) / np.float32(high - low)
 
 
-def _righted(levels: FloatArray, transpose: bool, reverse_rows: bool, reverse_columns: bool) -> FloatArray:
+def _righted(levels: Float32Array, transpose: bool, reverse_rows: bool, reverse_columns: bool) -> Float32Array:
     if transpose:
         levels = levels.swapaxes(1, 2)
     return levels[:, :: -1 if reverse_rows else 1, :: -1 if reverse_columns else 1]

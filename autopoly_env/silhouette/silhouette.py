@@ -7,16 +7,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from autopoly_env import object_mask
+from autopoly_env.arrays import BoolArray, FloatArray, IntArray
 from autopoly_env.errors import ConfigError, SilhouetteError
-from autopoly_env.image_files import find_images
-from autopoly_env.image_loading import ImageSource, read_picture
+from autopoly_env.silhouette import object_mask
+from autopoly_env.silhouette.image_files import find_images
+from autopoly_env.silhouette.loading import ImageSource, read_picture
 
 __all__ = ["ImageSource", "Silhouette", "Target", "find_images", "load_silhouette"]
 
-BoolArray = npt.NDArray[np.bool_]
-IntArray = npt.NDArray[np.int64]
-FloatArray = npt.NDArray[np.float64]
 WEIGHT_STEPS = 2**20  # of a weight of 1
 
 

@@ -5,11 +5,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from autopoly_env.arrays import BoolArray, Float32Array, IntArray
 from autopoly_env.errors import SilhouetteError
-from autopoly_env.image_loading import FloatArray, Picture
-
-BoolArray = npt.NDArray[np.bool_]
-IntArray = npt.NDArray[np.integer[Any]]
+from autopoly_env.silhouette.loading import Picture
 
 OPAQUE = 0.5  # alpha from here on (128 of 255) is the object
 # A level is unclear when it is further than FAR of the distance between the class means from both of them; a
@@ -49,7 +47,7 @@ def _no_object(picture: Picture, finding: str) -> SilhouetteError:
     return SilhouetteError(f"{picture.label} {finding}: there is no object; {advice}: give another image")
 
 
-def _split_by_grey(grey: FloatArray) -> tuple[BoolArray, list[str]]:
+def _split_by_grey(grey: Float32Array) -> tuple[BoolArray, list[str]]:
     from skimage.filters import threshold_otsu  # here, because scikit-image is slow to import
 
     threshold = float(threshold_otsu(grey))
@@ -67,7 +65,7 @@ def _split_by_grey(grey: FloatArray) -> tuple[BoolArray, list[str]]:
     return light != background_is_light, notes
 
 
-def _unclear_share(grey: FloatArray, light: BoolArray) -> float:
+def _unclear_share(grey: Float32Array, light: BoolArray) -> float:
     """The share of pixels whose level is far from the means of both classes.
 
     Pixels beside one of the other class do not count: an antialiased outline makes them, and in small icons

@@ -1,0 +1,17 @@
+"""Target pictures: found, read, told from their background, and averaged to any resolution."""
+
+from autopoly_env.silhouette.image_files import find_images
+from autopoly_env.silhouette.loading import ROUNDING, ImageSource, read_picture
+from autopoly_env.silhouette.silhouette import WEIGHT_STEPS, Silhouette, Target, area_means, load_silhouette
+
+__all__ = [
+    "ROUNDING",
+    "WEIGHT_STEPS",
+    "ImageSource",
+    "Silhouette",
+    "Target",
+    "area_means",
+    "find_images",
+    "load_silhouette",
+    "read_picture",
+]
