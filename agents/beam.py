@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from agents.base import Agent, Decision, Meter, Track
 from autopoly_env.actions import STOP
 from autopoly_env.errors import ConfigError
-from autopoly_env.mesh import canonical_hash
-from autopoly_env.placement import is_sane
+from autopoly_env.mesh import canonical_hash, is_sane
 from autopoly_env.simulator import Simulator, State
 
 

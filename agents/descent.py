@@ -7,8 +7,7 @@ the picture has no gradient and stays where it is. Letters: V vertices, R pixels
 import torch
 
 from autopoly_env.arrays import FloatArray
-from autopoly_env.mesh import PolyMesh
-from autopoly_env.placement import is_sane
+from autopoly_env.mesh import PolyMesh, is_sane
 from autopoly_env.silhouette import Target
 from autopoly_env.torch_raster import coverage
 

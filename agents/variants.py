@@ -10,8 +10,7 @@ from autopoly_env.arrays import FloatArray
 from autopoly_env.deformation import ThinPlate
 from autopoly_env.errors import AutoPolyError, SequenceError
 from autopoly_env.follower import Place
-from autopoly_env.mesh import PolyMesh
-from autopoly_env.placement import is_sane
+from autopoly_env.mesh import PolyMesh, is_sane
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.variation import moved_by
 

@@ -14,9 +14,8 @@ from autopoly_env.arrays import BoolArray, FloatArray
 from autopoly_env.errors import IllegalActionError
 from autopoly_env.hole_kernels import roomy_faces
 from autopoly_env.holes import HoleChoice, default_hole, hole_defect
-from autopoly_env.mesh import PolyMesh
-from autopoly_env.planar_kernels import clear_extrusion, split_imbalance, splittable_corners
-from autopoly_env.topology import Face, Topology
+from autopoly_env.mesh import Face, PolyMesh, Topology
+from autopoly_env.mesh.planar_kernels import clear_extrusion, split_imbalance, splittable_corners
 
 Choice = int | HoleChoice
 HOLE_SIDES = (3, 4)
@@ -127,8 +126,7 @@ def extrude_edge(mesh: PolyMesh, edge: int, _choice: Choice | None) -> PolyMesh:
 
 def corners_with_diagonal(mesh: PolyMesh) -> BoolArray:
     topology = mesh.topology
-    tails = topology.half_edges[:, 0]
-    mask: BoolArray = splittable_corners(mesh.vertices, tails, topology.face_offsets, topology.edges)
+    mask: BoolArray = splittable_corners(mesh.vertices, topology.corners, topology.face_offsets, topology.edges)
     return mask
 
 
@@ -195,9 +193,7 @@ def _without(items: tuple[_Item, ...], i: int) -> tuple[_Item, ...]:
 
 def faces_with_room(mesh: PolyMesh) -> BoolArray:
     topology = mesh.topology
-    return np.repeat(
-        roomy_faces(mesh.vertices, topology.half_edges[:, 0], topology.face_offsets, TINY_AREA), len(HOLE_SIDES)
-    )
+    return np.repeat(roomy_faces(mesh.vertices, topology.corners, topology.face_offsets, TINY_AREA), len(HOLE_SIDES))
 
 
 def _hole_of(element: int) -> tuple[int, int]:

@@ -12,9 +12,8 @@ import numpy as np
 
 from autopoly_env.actions import Action, describe
 from autopoly_env.errors import ConfigError, IllegalActionError, MeshError
-from autopoly_env.mesh import PolyMesh, canonical_hash, validate
+from autopoly_env.mesh import PolyMesh, canonical_hash, defects_of, validate
 from autopoly_env.operators import OPERATORS
-from autopoly_env.placement import defects_of
 from autopoly_env.refit import Bonds
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import Silhouette

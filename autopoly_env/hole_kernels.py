@@ -8,7 +8,14 @@ import numpy as np
 
 from autopoly_env.arrays import BoolArray, FloatArray, IntArray
 from autopoly_env.compute import kernel
-from autopoly_env.planar_kernels import arc_area, enters_cone, misses_ring, point_on_segment, ring_of, segments_touch
+from autopoly_env.mesh.planar_kernels import (
+    arc_area,
+    enters_cone,
+    misses_ring,
+    point_on_segment,
+    ring_of,
+    segments_touch,
+)
 
 
 @kernel

@@ -20,7 +20,7 @@ from autopoly_env.hole_kernels import (
     is_simple_ring,
 )
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.planar_kernels import arc_area, segments_touch
+from autopoly_env.mesh.planar_kernels import arc_area, segments_touch
 
 BALANCE_WEIGHT = 0.25  # what a wholly one-sided cut costs, in lengths of the square root of the face's area
 Bridge = tuple[int, int]

@@ -9,8 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from autopoly_env.arrays import FloatArray
-from autopoly_env.mesh import PolyMesh
-from autopoly_env.placement import is_sane
+from autopoly_env.mesh import PolyMesh, is_sane
 from autopoly_env.sequence import ConstructionSequence
 
 LEAST_MOVE = 0.01  # of the image's side: a vertex that moves less is said to stay

@@ -14,9 +14,9 @@ from autopoly_env.arrays import FloatArray, IntArray
 from autopoly_env.edits import HOLE_SIDES, Choice
 from autopoly_env.errors import IllegalActionError
 from autopoly_env.holes import HoleChoice, plan_hole
-from autopoly_env.mesh import PolyMesh
+from autopoly_env.mesh import PolyMesh, defects_of
 from autopoly_env.operators import OPERATORS
-from autopoly_env.placement import Disagreement, Start, defects_of, leaves_outline_alone, starts
+from autopoly_env.placement import Disagreement, Start, leaves_outline_alone, starts
 from autopoly_env.symmetry import images_of, mirrored
 
 _HOLE_SCALES = (1.0, 0.6)  # of a hole on the axis, tried until it fits

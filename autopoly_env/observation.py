@@ -61,7 +61,7 @@ class Observer:
     def observe(self, mesh: PolyMesh, target: ByteArray, remaining_steps: int) -> Observation:
         """New arrays of what there is to see; `target` is what `picture_of` gives."""
         topology = mesh.topology
-        corners = np.column_stack((topology.half_edge_face, topology.half_edges[:, 0]))
+        corners = np.column_stack((topology.half_edge_face, topology.corners))
         n_vertices, n_edges, n_faces = mesh.counts
         return {
             "rendering": as_bytes(coverage(mesh, self._resolution))[None],

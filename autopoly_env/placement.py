@@ -17,7 +17,7 @@ from autopoly_env.arrays import FloatArray
 from autopoly_env.edits import HOLE_SIDES, Choice
 from autopoly_env.errors import IllegalActionError
 from autopoly_env.holes import HoleChoice, plan_hole
-from autopoly_env.mesh import PolyMesh
+from autopoly_env.mesh import PolyMesh, defects_of
 from autopoly_env.operators import OPERATORS, n_elements
 from autopoly_env.placement_kernels import (
     AREA,
@@ -37,8 +37,6 @@ from autopoly_env.placement_kernels import (
     VAR_Y,
 )
 from autopoly_env.raster import coverage
-from autopoly_env.refit import shape_of
-from autopoly_env.refit_kernels import defects
 from autopoly_env.silhouette import Silhouette
 
 RESOLUTION = 64  # at which disagreement is looked at
@@ -98,17 +96,6 @@ class Disagreement:
             return None
         regions = regions[shapely.contains_xy(polygon, regions[:, DEEP_X], regions[:, DEEP_Y])]
         return regions[np.argmin(regions[:, AREA])] if len(regions) else None
-
-
-def defects_of(mesh: PolyMesh) -> tuple[int, int]:
-    """(crossings, flipped or empty faces) as the refit counts them."""
-    crossings, flipped = defects(mesh.vertices, shape_of(mesh.topology))
-    return int(crossings), int(flipped)
-
-
-def is_sane(mesh: PolyMesh) -> bool:
-    """Whether no edges cross and no face is flipped or empty."""
-    return defects_of(mesh) == (0, 0)
 
 
 def starts(disagreement: Disagreement, action: Action) -> list[Start]:

@@ -172,7 +172,7 @@ def shape_of(topology: Topology) -> Shape:
         boundary=boundary,
         loops=np.ascontiguousarray(unknown[directed]),
         edges=topology.edges,
-        corners=np.ascontiguousarray(topology.half_edges[:, 0]),
+        corners=topology.corners,
         offsets=topology.face_offsets,
         inner=inner,
         neighbours=np.concatenate([*lists, np.empty(0, np.int64)]),

@@ -12,10 +12,9 @@ import numpy as np
 from autopoly_env.arrays import BoolArray, FloatArray, IntArray
 from autopoly_env.compute import kernel
 from autopoly_env.derivative_kernels import half_gradient, normal_equations
-from autopoly_env.geometry_kernels import count_crossings, face_areas
+from autopoly_env.mesh.geometry_kernels import defects
 from autopoly_env.raster_kernels import Workspace
 
-_MIN_FACE_AREA = 1e-9
 _FIRST_RATE, _LAST_RATE = 2.0 / 64.0, 0.1 / 64.0  # of the far phase, in unit-square lengths
 _IDLE_SHARE = 0.03  # of the steepest slope: below it the far phase slows down, or idle vertices would race along edges
 _MAX_MOVE = 4.0  # of a vertex in one step of the near phase, in pixels of the level
@@ -154,23 +153,12 @@ def _spread(start: FloatArray, unknowns: FloatArray, shape: Shape, low: float, h
 
 
 @kernel
-def defects(points: FloatArray, shape: Shape) -> tuple[int, int]:
-    """(crossings, flipped or empty faces); a crossing that rounding decides counts."""
-    certain, uncertain = count_crossings(points, shape.edges)
-    flipped = 0
-    for area in face_areas(points, shape.corners, shape.offsets):
-        if not area > _MIN_FACE_AREA:
-            flipped += 1
-    return certain + uncertain, flipped
-
-
-@kernel
 def _offer(
     start: FloatArray, unknowns: FloatArray, shape: Shape, loss: float, trial: FloatArray, best: Progress
 ) -> bool:
     """Keep the mesh if it is sane and its loss is the least so far; say whether it is sane."""
     _spread(start, unknowns, shape, best.record[4], best.record[5], trial)
-    crossings, flipped = defects(trial, shape)
+    crossings, flipped = defects(trial, shape.edges, shape.corners, shape.offsets)
     sane = crossings <= best.record[1] and flipped <= best.record[2]
     if sane and loss < best.record[0]:
         best.record[0] = loss
@@ -406,7 +394,7 @@ def refit(
             unknowns[k, axis] = start[v, axis]
             low, high = min(low, start[v, axis]), max(high, start[v, axis])
     fine = pyramid[len(pyramid) - 1]
-    crossings, flipped = defects(start, shape)
+    crossings, flipped = defects(start, shape.edges, shape.corners, shape.offsets)
     best = Progress(start.copy(), np.zeros(6))
     best.record[1] = 1e9 if settings.keep_defects else crossings
     best.record[2] = 1e9 if settings.keep_defects else flipped

@@ -9,8 +9,7 @@ import numpy as np
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
 from autopoly_env.errors import MeshError, SequenceError
-from autopoly_env.mesh import PolyMesh, validate
-from autopoly_env.topology import Topology
+from autopoly_env.mesh import PolyMesh, Topology, validate
 
 FORMAT = "autopoly-construction-sequence"
 VERSION = 1

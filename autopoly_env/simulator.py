@@ -20,10 +20,10 @@ from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.guidance import Guidance, importance_settings
 from autopoly_env.importance import ImportanceSource, weighted
 from autopoly_env.lesson import share_moved
-from autopoly_env.mesh import PolyMesh
+from autopoly_env.mesh import PolyMesh, defects_of
 from autopoly_env.mirror import Beginning, Halfway, mirrored_starts
 from autopoly_env.operators import preset
-from autopoly_env.placement import Disagreement, defects_of, leaves_outline_alone, starts
+from autopoly_env.placement import Disagreement, leaves_outline_alone, starts
 from autopoly_env.refit import FROM_AFAR, LOCAL, THOROUGH, RefitConfig, RefitTarget, holding, refit
 from autopoly_env.score import Score, ScoreWeights, score
 from autopoly_env.sequence import ConstructionSequence

@@ -10,8 +10,9 @@ import numpy as np
 
 from autopoly_env.arrays import BoolArray, FloatArray, IntArray
 from autopoly_env.compute import kernel
+from autopoly_env.mesh.geometry_kernels import defects
 from autopoly_env.raster_kernels import Workspace, overlap_counts_in_rows
-from autopoly_env.refit_kernels import Shape, defects
+from autopoly_env.refit_kernels import Shape
 
 _STEPS = (2.0, 1.0, 0.5, 0.25)  # pixels
 _N_DIRECTIONS = 8
@@ -69,7 +70,7 @@ def tune(
     """
     size = pixels.mask.shape[0]
     inside, filled = _counts(points, edges, pixels, work, 0, size)
-    crossings, flipped = defects(points, shape)
+    crossings, flipped = defects(points, shape.edges, shape.corners, shape.offsets)
     for step in _STEPS:
         for _round in range(_N_ROUNDS):
             n_moved = 0
@@ -95,7 +96,7 @@ def tune(
                     gain_inside, gain_filled = new_inside - part_inside, new_filled - part_filled
                     iou = _iou(inside + gain_inside, filled + gain_filled, pixels)
                     if iou > _iou(inside, filled, pixels) + _LEAST_GAIN:
-                        now_crossings, now_flipped = defects(points, shape)
+                        now_crossings, now_flipped = defects(points, shape.edges, shape.corners, shape.offsets)
                         if now_crossings <= crossings and now_flipped <= flipped:
                             inside, filled = inside + gain_inside, filled + gain_filled
                             n_moved += 1

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from autopoly_env import placement_kernels
 from autopoly_env.arrays import FloatArray
-from autopoly_env.geometry_kernels import UNCERTAIN, count_crossings, face_areas, orientation
 from autopoly_env.mesh import PolyMesh
+from autopoly_env.mesh.geometry_kernels import UNCERTAIN, count_crossings, face_areas, orientation
 from autopoly_env.placement_kernels import blame_edges, measure_regions, regions_of
 from tests.shapes import loop, pairs_that_meet, star
 from tests.strategies import meshes, random_walk
@@ -98,7 +98,7 @@ def test_crossings__of_meshes_are_bracketed(mesh: PolyMesh, seed: int, shake: fl
 
 
 def areas_of(mesh: PolyMesh) -> list[float]:
-    return face_areas(mesh.vertices, mesh.topology.half_edges[:, 0].copy(), mesh.topology.face_offsets).tolist()
+    return face_areas(mesh.vertices, mesh.topology.corners, mesh.topology.face_offsets).tolist()
 
 
 def test_face_areas__by_hand() -> None:

@@ -22,8 +22,8 @@ from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import ConfigError, IllegalActionError, MeshError
 from autopoly_env.export import from_obj, load_obj, to_obj
 from autopoly_env.importance import weighted
-from autopoly_env.mesh import PolyMesh, is_valid
-from autopoly_env.placement import Disagreement, defects_of
+from autopoly_env.mesh import PolyMesh, defects_of, is_valid
+from autopoly_env.placement import Disagreement
 from autopoly_env.placement_kernels import MASS, MEAN_X
 from autopoly_env.raster import coverage, loss_and_gradient, loss_and_gradient_many
 from autopoly_env.refit import FROM_AFAR, Bonds, RefitTarget, refit

@@ -13,9 +13,9 @@ from autopoly_env.actions import Action, legal_actions
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import IllegalActionError
 from autopoly_env.holes import HoleChoice
-from autopoly_env.mesh import PolyMesh
+from autopoly_env.mesh import PolyMesh, defects_of
 from autopoly_env.operators import OPERATORS, n_elements
-from autopoly_env.placement import Disagreement, defects_of, leaves_outline_alone, starts
+from autopoly_env.placement import Disagreement, leaves_outline_alone, starts
 from autopoly_env.raster import coverage
 from tests.drawings import FRAME, SQUARE, noise, painted
 from tests.shapes import polygon

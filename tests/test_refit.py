@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from autopoly_env.arrays import FloatArray
 from autopoly_env.compute import set_threads
-from autopoly_env.geometry_kernels import count_crossings
 from autopoly_env.mesh import PolyMesh
+from autopoly_env.mesh.geometry_kernels import count_crossings
 from autopoly_env.raster import coverage
 from autopoly_env.refit import (
     FROM_AFAR,

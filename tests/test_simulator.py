@@ -15,9 +15,8 @@ from hypothesis import strategies as st
 from autopoly_env.actions import STOP, Action
 from autopoly_env.compute import set_threads
 from autopoly_env.errors import ConfigError, IllegalActionError
-from autopoly_env.mesh import PolyMesh, is_valid
+from autopoly_env.mesh import PolyMesh, defects_of, is_valid
 from autopoly_env.operators import OPERATORS, n_elements
-from autopoly_env.placement import defects_of
 from autopoly_env.refit import LOCAL, refit
 from autopoly_env.score import ScoreWeights, score
 from autopoly_env.sequence import ConstructionSequence

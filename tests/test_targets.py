@@ -14,8 +14,7 @@ from PIL import Image
 from skimage.measure import label
 
 from autopoly_env.errors import AutoPolyError, ConfigError, SilhouetteError
-from autopoly_env.mesh import PolyMesh, is_valid
-from autopoly_env.placement import defects_of
+from autopoly_env.mesh import PolyMesh, defects_of, is_valid
 from autopoly_env.raster import coverage
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import Silhouette

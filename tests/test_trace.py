@@ -21,8 +21,7 @@ from agents.trace.rings import Ring, signed_area, trace_rings
 from agents.trace.simplify import Contour
 from agents.trace.simplify_kernels import chord_errors, thin
 from autopoly_env.arrays import FloatArray
-from autopoly_env.mesh import PolyMesh, is_valid
-from autopoly_env.placement import defects_of
+from autopoly_env.mesh import PolyMesh, defects_of, is_valid
 from autopoly_env.score import ScoreWeights
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator, State

@@ -16,7 +16,7 @@ from agents.guided.config import CLASSES, STOP_CLASS, NfapConfig, WarpConfig
 from agents.guided.regions import region_image
 from agents.guided.weights import load_nfap, load_warpnet
 from autopoly_env.errors import ConfigError, RunError
-from autopoly_env.placement import is_sane
+from autopoly_env.mesh import is_sane
 from autopoly_env.score import ScoreWeights
 from autopoly_env.simulator import Simulator
 from training import finish, make_expert, train_nfap, train_warpnet

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from autopoly_env.mesh import PolyMesh
-from autopoly_env.placement import is_sane
+from autopoly_env.mesh import PolyMesh, is_sane
 from autopoly_env.refit import Bonds
 from autopoly_env.score import intersection_over_union
 from autopoly_env.silhouette import Silhouette, Target

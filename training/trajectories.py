@@ -20,10 +20,9 @@ from autopoly_env.actions import Action
 from autopoly_env.arrays import BoolArray
 from autopoly_env.errors import ConfigError
 from autopoly_env.files import write_atomically
-from autopoly_env.mesh import PolyMesh
+from autopoly_env.mesh import PolyMesh, Topology
 from autopoly_env.operators import OPERATORS
 from autopoly_env.silhouette import Silhouette
-from autopoly_env.topology import Topology
 
 VERSION = 1
 STOPPED = -1  # instead of the row of an action: the right thing is to stop

@@ -17,9 +17,8 @@ from autopoly_env.arrays import FloatArray
 from autopoly_env.edits import Choice
 from autopoly_env.errors import AutoPolyError, IllegalActionError
 from autopoly_env.holes import HoleChoice, plan_hole
-from autopoly_env.mesh import PolyMesh
+from autopoly_env.mesh import PolyMesh, is_sane
 from autopoly_env.operators import OPERATORS
-from autopoly_env.placement import is_sane
 from autopoly_env.simulator import Simulator, State
 
 _N_NATURAL_TRIES = 200  # ways to grow a further part out of the mesh that are tried before it is put in place at once

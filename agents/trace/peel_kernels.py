@@ -4,8 +4,8 @@ import numpy as np
 
 from autopoly_env.arrays import BoolArray, FloatArray, IntArray
 from autopoly_env.compute import kernel
-from autopoly_env.geometry_kernels import orientation
-from autopoly_env.planar_kernels import segments_touch
+from autopoly_env.mesh.geometry_kernels import orientation
+from autopoly_env.mesh.planar_kernels import segments_touch
 
 
 @kernel

@@ -8,8 +8,7 @@ import numpy as np
 from autopoly_env.arrays import FloatArray, IntArray
 from autopoly_env.errors import ConfigError
 from autopoly_env.export.triangles import triangulate
-from autopoly_env.mesh import PolyMesh
-from autopoly_env.topology import Face, Topology
+from autopoly_env.mesh import Face, PolyMesh, Topology
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@ import numpy as np
 
 from autopoly_env.arrays import FloatArray, IntArray
 from autopoly_env.compute import kernel
-from autopoly_env.geometry_kernels import orientation
+from autopoly_env.mesh.geometry_kernels import orientation
 
 
 @kernel

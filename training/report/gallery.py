@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from autopoly_env.arrays import BoolArray
 from autopoly_env.errors import AutoPolyError, SilhouetteError
 from autopoly_env.silhouette import Silhouette
-from autopoly_env.silhouette.silhouette import BoolArray
 from training.records import Outcome, Record
 from training.report.axes import number
 from training.report.charts import colour_class, marker

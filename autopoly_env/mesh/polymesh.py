@@ -16,9 +16,10 @@ import numpy.typing as npt
 
 from autopoly_env.arrays import FloatArray, IntArray
 from autopoly_env.errors import MeshError
-from autopoly_env.topology import Face, Topology
+from autopoly_env.mesh.drawing import Figure, drawing, groups
+from autopoly_env.mesh.topology import Face, Topology
 
-__all__ = ["PolyMesh", "Topology", "canonical_hash", "is_valid", "validate"]
+_NOTEBOOK_SIZE = 320  # user units a side of the drawing that notebooks show
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -151,11 +152,15 @@ class PolyMesh:
         n_vertices, n_edges, n_faces = self.counts
         return f"PolyMesh(V={n_vertices}, E={n_edges}, F={n_faces})"
 
+    @property
+    def figure(self) -> Figure:
+        """What a drawing shows of it."""
+        points = [(x, y) for x, y in self.vertices.tolist()]
+        return Figure(points, self.vertex_ids, self.edges.tolist(), self.faces, self.face_ids)
+
     def _repr_svg_(self) -> str:
         """A drawing, for notebooks."""
-        from autopoly_env.export.svg import to_svg
-
-        return to_svg(self, size=320)
+        return drawing(_NOTEBOOK_SIZE, groups(self.figure, _NOTEBOOK_SIZE))
 
 
 def validate(mesh: PolyMesh) -> None:

@@ -9,6 +9,7 @@ from autopoly_env.compute import kernel
 # arithmetic and fast robust geometric predicates", ccwerrboundA).
 _ORIENTATION_ERROR = (3.0 + 16.0 * 2.0**-53) * 2.0**-53
 UNCERTAIN = 2
+_MIN_FACE_AREA = 1e-9  # unit square; a face of less counts as empty
 
 
 @kernel
@@ -81,3 +82,14 @@ def face_areas(points: FloatArray, corners: IntArray, offsets: IntArray) -> Floa
             area += (points[i, 0] - ox) * (points[j, 1] - oy) - (points[j, 0] - ox) * (points[i, 1] - oy)
         areas[face] = 0.5 * area
     return areas
+
+
+@kernel
+def defects(points: FloatArray, edges: IntArray, corners: IntArray, offsets: IntArray) -> tuple[int, int]:
+    """(crossings, flipped or empty faces) of a mesh; a crossing that rounding decides counts."""
+    certain, uncertain = count_crossings(points, edges)
+    flipped = 0
+    for area in face_areas(points, corners, offsets):
+        if not area > _MIN_FACE_AREA:
+            flipped += 1
+    return certain + uncertain, flipped

@@ -41,6 +41,10 @@ class Topology:
 
     @cached_property
     def links(self) -> HalfEdges:
+        """How the half-edges hang together, H entries in each list but the last; all other properties follow from it.
+
+        Numbered face by face, corner by corner. A valid mesh has each pair (tail, head) at most once.
+        """
         tails: list[int] = []
         heads: list[int] = []
         owners: list[int] = []
@@ -77,11 +81,9 @@ class Topology:
         return _read_only(np.array(self.links.faces, np.int64))
 
     @cached_property
-    def half_edge_edge(self) -> IntArray:
-        """(H,) the edge under each half-edge, an index into `edges`."""
-        lookup, links = self.edge_lookup, self.links
-        pairs = zip(links.tails, links.heads, strict=True)
-        return _read_only(np.array([lookup[(a, b) if a < b else (b, a)] for a, b in pairs], np.int64))
+    def corners(self) -> IntArray:
+        """(H,) the vertices of all faces, face by face: where each half-edge begins."""
+        return _read_only(np.array(self.links.tails, np.int64))
 
     @cached_property
     def face_offsets(self) -> IntArray:

@@ -1,0 +1,7 @@
+"""Polygon meshes: what they are, what follows from their faces, what may be wrong with them, how they are drawn."""
+
+from autopoly_env.mesh.polymesh import PolyMesh, canonical_hash, is_valid, validate
+from autopoly_env.mesh.sanity import defects_of, is_sane
+from autopoly_env.mesh.topology import Face, Topology
+
+__all__ = ["Face", "PolyMesh", "Topology", "canonical_hash", "defects_of", "is_sane", "is_valid", "validate"]
