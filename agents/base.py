@@ -10,11 +10,10 @@ from typing import TypeVar
 from agents.pare import pare
 from agents.settle import settle
 from agents.tidy import tidy
-from autopoly_env.actions import STOP, Action
-from autopoly_env.edits import Choice
 from autopoly_env.errors import ConfigError
 from autopoly_env.guidance import continued
 from autopoly_env.mesh import PolyMesh
+from autopoly_env.operators import STOP, Action, Choice
 from autopoly_env.score import Score
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence_file import Score as PlainScore

@@ -4,9 +4,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from agents.base import Agent, Decision, Meter, Track
-from autopoly_env.actions import STOP
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import canonical_hash, is_sane
+from autopoly_env.operators import STOP
 from autopoly_env.simulator import Simulator, State
 
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 from agents.base import Agent, Budget, Decision, Meter, Progress, Solution, Track, finish
 from agents.beam import BeamAgent, BeamConfig
-from autopoly_env.actions import STOP
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import canonical_hash
+from autopoly_env.operators import STOP
 from autopoly_env.simulator import Simulator, State
 
 _NARROW = (1, 8)  # widths that are tried, too: now and then a narrow beam finds what a wide one has crowded out

@@ -4,10 +4,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from agents.tidy import REMOVING
-from autopoly_env.actions import STOP, Action
 from autopoly_env.errors import IllegalActionError
 from autopoly_env.mesh import is_sane
-from autopoly_env.operators import OPERATORS
+from autopoly_env.operators import OPERATORS, STOP, Action
 from autopoly_env.simulator import Simulator, State
 
 _N_TRIED = 4  # removals that are refitted, those that are worth most as they are

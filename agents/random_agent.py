@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from agents.base import Agent, Decision
-from autopoly_env.actions import STOP, Action
 from autopoly_env.errors import ConfigError
+from autopoly_env.operators import STOP, Action
 from autopoly_env.simulator import Simulator, State
 
 

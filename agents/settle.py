@@ -11,12 +11,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from autopoly_env.actions import Action
-from autopoly_env.edits import Choice
 from autopoly_env.errors import IllegalActionError
 from autopoly_env.lesson import LEAST_MOVE
 from autopoly_env.mesh import PolyMesh, is_sane
-from autopoly_env.operators import OPERATORS
+from autopoly_env.operators import OPERATORS, Action, Choice
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence_ids import decoded
 from autopoly_env.simulator import Simulator

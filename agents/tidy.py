@@ -8,11 +8,9 @@ sane meshes only. What they moved on the way moves with the step before or after
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from autopoly_env.actions import Action
-from autopoly_env.edits import Choice
 from autopoly_env.errors import AutoPolyError
 from autopoly_env.mesh import PolyMesh, is_sane
-from autopoly_env.operators import OPERATORS
+from autopoly_env.operators import OPERATORS, Action, Choice
 from autopoly_env.score import Score
 from autopoly_env.sequence import ConstructionSequence, Step
 from autopoly_env.sequence_ids import choice_indices, element_index

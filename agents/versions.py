@@ -6,13 +6,11 @@ from functools import cached_property
 
 import numpy as np
 
-from autopoly_env.actions import Action
 from autopoly_env.deformation import ThinPlate
-from autopoly_env.edits import HOLE_SIDES
 from autopoly_env.errors import AutoPolyError
 from autopoly_env.follower import Follower, Taken, moved_to
 from autopoly_env.mesh import PolyMesh, is_sane
-from autopoly_env.operators import OPERATORS
+from autopoly_env.operators import HOLE_SIDES, OPERATORS, Action
 from autopoly_env.placement import Disagreement, starts
 from autopoly_env.score import Score
 from autopoly_env.sequence import ConstructionSequence

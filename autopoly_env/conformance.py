@@ -12,10 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from autopoly_env.actions import STOP
 from autopoly_env.errors import AutoPolyError, ConfigError, ConformanceError, IllegalActionError
 from autopoly_env.mesh import PolyMesh, is_valid
-from autopoly_env.operators import OPERATORS, Operator, n_elements
+from autopoly_env.operators import OPERATORS, STOP, Operator, n_elements
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator, State
 from autopoly_env.targets import TargetSource

@@ -8,13 +8,13 @@ from typing import Any, SupportsFloat, cast
 import gymnasium
 import numpy as np
 
-from autopoly_env.actions import Action, ActionCodec, describe
 from autopoly_env.arguments import number, one_of, whole
 from autopoly_env.arrays import BoolArray
 from autopoly_env.compute import Routine, run
 from autopoly_env.errors import ConfigError, EpisodeError, IllegalActionError
 from autopoly_env.mesh import PolyMesh, validate
 from autopoly_env.observation import Observation, Observer
+from autopoly_env.operators import Action, ActionCodec, describe
 from autopoly_env.score import ScoreWeights
 from autopoly_env.silhouette import Silhouette, load_silhouette
 from autopoly_env.simulator import Simulator, State

@@ -10,12 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from autopoly_env.actions import Action
 from autopoly_env.arrays import FloatArray
-from autopoly_env.edits import Choice
 from autopoly_env.errors import MeshError, SequenceError
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import OPERATORS
+from autopoly_env.operators import OPERATORS, Action, Choice
 from autopoly_env.sequence_file import Step
 from autopoly_env.sequence_ids import choice_indices, decoded, element_index
 

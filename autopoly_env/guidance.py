@@ -10,10 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from autopoly_env.actions import Action, describe
 from autopoly_env.errors import ConfigError, IllegalActionError, MeshError
 from autopoly_env.mesh import PolyMesh, canonical_hash, defects_of, validate
-from autopoly_env.operators import OPERATORS
+from autopoly_env.operators import OPERATORS, Action, describe
 from autopoly_env.refit import Bonds
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import Silhouette

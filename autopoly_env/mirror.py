@@ -9,13 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from autopoly_env.actions import Action, describe
 from autopoly_env.arrays import FloatArray, IntArray
-from autopoly_env.edits import HOLE_SIDES, Choice
 from autopoly_env.errors import IllegalActionError
-from autopoly_env.holes import HoleChoice, plan_hole
 from autopoly_env.mesh import PolyMesh, defects_of
-from autopoly_env.operators import OPERATORS
+from autopoly_env.operators import HOLE_SIDES, OPERATORS, Action, Choice, HoleChoice, describe, plan_hole
 from autopoly_env.placement import Disagreement, Start, leaves_outline_alone, starts
 from autopoly_env.symmetry import images_of, mirrored
 

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from autopoly_env.actions import CAPACITY_PER_VERTEX
 from autopoly_env.arrays import ByteArray
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
+from autopoly_env.operators import CAPACITY_PER_VERTEX
 from autopoly_env.raster import coverage
 from autopoly_env.silhouette import Silhouette
 

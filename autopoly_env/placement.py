@@ -12,13 +12,10 @@ import numpy as np
 import shapely
 
 from autopoly_env import placement_kernels
-from autopoly_env.actions import Action
 from autopoly_env.arrays import FloatArray
-from autopoly_env.edits import HOLE_SIDES, Choice
 from autopoly_env.errors import IllegalActionError
-from autopoly_env.holes import HoleChoice, plan_hole
 from autopoly_env.mesh import PolyMesh, defects_of
-from autopoly_env.operators import OPERATORS, n_elements
+from autopoly_env.operators import HOLE_SIDES, OPERATORS, Action, Choice, HoleChoice, n_elements, plan_hole
 from autopoly_env.placement_kernels import (
     AREA,
     COV_XY,

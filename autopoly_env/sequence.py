@@ -10,10 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from autopoly_env.actions import STOP, Action
 from autopoly_env.errors import AutoPolyError, OutputError, SequenceError
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import Choice
+from autopoly_env.operators import STOP, Action, Choice
 from autopoly_env.sequence_file import Score, Step, check_score, dump_json, parse_json, plain_json
 from autopoly_env.sequence_ids import choice_ids, decoded, element_ids, element_words, operator_named
 

@@ -2,11 +2,9 @@
 
 from typing import Any
 
-from autopoly_env.edits import HOLE_SIDES
 from autopoly_env.errors import SequenceError
-from autopoly_env.holes import HoleChoice
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import OPERATORS, Choice, Operator
+from autopoly_env.operators import HOLE_SIDES, OPERATORS, Choice, HoleChoice, Operator
 from autopoly_env.sequence_file import Step, parse_hole, parse_id
 
 

@@ -3,9 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
-from autopoly_env.actions import Action
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import OPERATORS
+from autopoly_env.operators import OPERATORS, Action
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence_ids import element_index
 

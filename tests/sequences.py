@@ -3,9 +3,8 @@
 from typing import Any
 
 from agents.random_agent import RandomAgent, RandomConfig
-from autopoly_env.actions import Action
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import OPERATORS
+from autopoly_env.operators import OPERATORS, Action
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.simulator import Simulator
 from tests.drawings import noise

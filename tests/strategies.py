@@ -7,9 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from hypothesis import strategies as st
 
-from autopoly_env.actions import Action, legal_actions
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import OPERATORS, Choice, preset
+from autopoly_env.operators import OPERATORS, Action, Choice, legal_actions, preset
 
 
 class Transition(NamedTuple):

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from autopoly_env.actions import STOP, Action, ActionCodec, describe, legal_actions
 from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.mesh import PolyMesh, is_valid
-from autopoly_env.operators import OPERATORS, preset
+from autopoly_env.operators import OPERATORS, STOP, Action, ActionCodec, describe, legal_actions, preset
 from tests.strategies import meshes
 
 PAPER = tuple(operator.name for operator in preset("paper"))

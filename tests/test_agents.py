@@ -12,10 +12,9 @@ from agents.base import Agent, Budget, Decision, Meter, Progress, Solution, Trac
 from agents.beam import BeamAgent, BeamConfig
 from agents.random_agent import RandomAgent, RandomConfig
 from agents.registry import AGENTS, make_agent
-from autopoly_env.actions import STOP, Action
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import OPERATORS
+from autopoly_env.operators import OPERATORS, STOP, Action
 from autopoly_env.score import Score, ScoreWeights, score
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.simulator import Simulator, State

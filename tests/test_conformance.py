@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 from autopoly_env import conformance
-from autopoly_env.actions import STOP, Action
 from autopoly_env.conformance import check_env, check_operator, check_simulator, check_target_source, sample_meshes
 from autopoly_env.env import AutoPolyEnv
 from autopoly_env.errors import ConformanceError
 from autopoly_env.mesh import PolyMesh, is_valid
-from autopoly_env.operators import OPERATORS, Operator
+from autopoly_env.operators import OPERATORS, STOP, Action, Operator
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator, State
 from autopoly_env.targets import ConstructionTargets, ObjectTargets

@@ -12,8 +12,8 @@ from agents.registry import make_agent
 from agents.trace.outline import Outline
 from agents.trace.reach import Reach
 from agents.trace.rings import Ring
-from autopoly_env.actions import STOP
 from autopoly_env.errors import ConfigError
+from autopoly_env.operators import STOP
 from autopoly_env.score import ScoreWeights
 from autopoly_env.simulator import Simulator
 from tests.drawings import FRAME, HOUSE, L_SHAPE, SQUARE, painted

@@ -20,12 +20,12 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import autopoly_env.env
-from autopoly_env.actions import Action
 from autopoly_env.conformance import check_env as check_autopoly_env
 from autopoly_env.env import AutoPolyEnv
 from autopoly_env.errors import AutoPolyError, ConfigError, EpisodeError, IllegalActionError, SilhouetteError
 from autopoly_env.export.gif import save_gif
 from autopoly_env.mesh import PolyMesh
+from autopoly_env.operators import Action
 from autopoly_env.raster import coverage
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.targets import ConstructionTargets, split_seed

@@ -16,12 +16,11 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from autopoly_env import viewer
-from autopoly_env.actions import Action
 from autopoly_env.errors import ConfigError, OutputError
 from autopoly_env.export import contact_sheet, save_png, sheet, to_obj, to_svg
 from autopoly_env.files import write_atomically
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import OPERATORS
+from autopoly_env.operators import OPERATORS, Action
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import Silhouette
 

@@ -9,9 +9,9 @@ import shapely
 
 from agents.base import Budget
 from agents.registry import make_agent
-from autopoly_env.actions import STOP
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh, defects_of
+from autopoly_env.operators import STOP
 from autopoly_env.simulator import Simulator
 from tests.drawings import L_SHAPE, SQUARE, TWO_SQUARES, noise, painted
 from tests.test_agents import TARGETS, assert_consistent, interrupt_at, simulator

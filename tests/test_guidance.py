@@ -17,12 +17,12 @@ from agents.base import Budget, Meter, Solution, finish
 from agents.registry import AGENTS, make_agent
 from agents.solve import main
 from autopoly_env import derivative_kernels, raster, refit_kernels
-from autopoly_env.actions import STOP, Action, legal_actions
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import ConfigError, IllegalActionError, MeshError
 from autopoly_env.export import from_obj, load_obj, to_obj
 from autopoly_env.importance import weighted
 from autopoly_env.mesh import PolyMesh, defects_of, is_valid
+from autopoly_env.operators import STOP, Action, legal_actions
 from autopoly_env.placement import Disagreement
 from autopoly_env.placement_kernels import MASS, MEAN_X
 from autopoly_env.raster import coverage, loss_and_gradient, loss_and_gradient_many

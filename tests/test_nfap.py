@@ -24,10 +24,9 @@ from agents.guided.warp import WarpNet
 from agents.guided.weights import SHIPPED, NetworkMeta, load_nfap, load_warpnet, save_weights
 from agents.registry import make_agent
 from agents.search.evaluator import ResidualEvaluator
-from autopoly_env.actions import STOP, Action, legal_actions
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import OPERATORS, PRESETS
+from autopoly_env.operators import OPERATORS, PRESETS, STOP, Action, legal_actions
 from autopoly_env.placement import Disagreement
 from autopoly_env.raster import coverage
 from autopoly_env.score import ScoreWeights

@@ -8,9 +8,9 @@ import pytest
 from agents.base import Budget, Meter, Progress, Track
 from agents.oracle import OracleAgent, OracleConfig
 from agents.registry import make_agent
-from autopoly_env.actions import STOP
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import is_sane
+from autopoly_env.operators import STOP
 from autopoly_env.simulator import Simulator, State
 from tests.drawings import HOUSE, SQUARE, painted
 from tests.test_agents import TARGETS, VALLEY, VALLEY_CHILDREN, Tree, assert_consistent, interrupt_at, simulator

@@ -15,12 +15,11 @@ import pytest
 from PIL import Image
 
 from autopoly_env import viewer
-from autopoly_env.actions import Action
 from autopoly_env.errors import OutputError, SequenceError
 from autopoly_env.export import save_html, to_html
 from autopoly_env.export.words import describe_start, describe_step
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import OPERATORS
+from autopoly_env.operators import OPERATORS, Action
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import Silhouette
 from tests.browser import Browser, Page, needs_browser

@@ -14,9 +14,8 @@ from PIL import Image
 from agents.base import Budget, Meter, Progress
 from agents.retarget import main
 from agents.retargeting import align, retarget
-from autopoly_env.actions import Action
 from autopoly_env.mesh import PolyMesh, is_sane
-from autopoly_env.operators import OPERATORS
+from autopoly_env.operators import OPERATORS, Action
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator

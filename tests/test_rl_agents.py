@@ -14,9 +14,9 @@ from agents.rl.config import NetConfig, Rules
 from agents.rl.network import MeshNet
 from agents.rl.player import Player
 from agents.rl.weights import load_policy, save_policy
-from autopoly_env.actions import STOP
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
+from autopoly_env.operators import STOP
 from autopoly_env.simulator import Simulator
 from tests.drawings import L_SHAPE, painted
 from training import evaluate

@@ -12,10 +12,9 @@ from agents.rl.config import NetConfig, Rules
 from agents.rl.links import averaged, links_of, summed
 from agents.rl.network import NEVER, MeshNet, observer_of
 from agents.rl.player import observation_of
-from autopoly_env.actions import ActionCodec
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import OPERATORS
+from autopoly_env.operators import OPERATORS, ActionCodec
 
 torch.set_num_threads(1)  # as tests run beside each other
 

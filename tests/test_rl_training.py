@@ -21,9 +21,9 @@ from agents.rl.network import NEVER, MeshNet, observer_of
 from agents.rl.player import Player
 from agents.rl.policies import net_of, put_net
 from agents.rl.weights import load_policy, save_policy
-from autopoly_env.actions import ActionCodec
 from autopoly_env.errors import AutoPolyError, ConfigError, RunError
 from autopoly_env.mesh import PolyMesh
+from autopoly_env.operators import ActionCodec
 from autopoly_env.score import ScoreWeights
 from autopoly_env.simulator import Simulator
 from training import rl_clone, rl_export, train_rl

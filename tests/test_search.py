@@ -18,10 +18,10 @@ from agents.search.search import Search
 from agents.search.selection import best_half, halving_schedule, puct, uct
 from agents.search.simulation import value_of
 from agents.search.tree import Node, ValueRange
-from autopoly_env.actions import STOP, Action
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
+from autopoly_env.operators import STOP, Action
 from autopoly_env.score import Score
 from autopoly_env.simulator import Simulator, State
 from tests.drawings import SQUARE, painted

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 
-from autopoly_env.actions import STOP, Action
 from autopoly_env.errors import OutputError, SequenceError
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import OPERATORS, HoleChoice
+from autopoly_env.operators import OPERATORS, STOP, Action, HoleChoice
 from autopoly_env.sequence import ConstructionSequence
 from tests.strategies import Transition, random_walk, walks
 

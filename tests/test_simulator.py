@@ -12,11 +12,10 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopoly_env.actions import STOP, Action
 from autopoly_env.compute import set_threads
 from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.mesh import PolyMesh, defects_of, is_valid
-from autopoly_env.operators import OPERATORS, n_elements
+from autopoly_env.operators import OPERATORS, STOP, Action, n_elements
 from autopoly_env.refit import LOCAL, refit
 from autopoly_env.score import ScoreWeights, score
 from autopoly_env.sequence import ConstructionSequence

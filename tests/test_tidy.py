@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 from agents.base import Meter, finish
 from agents.pare import pare
 from agents.tidy import tidy
-from autopoly_env.actions import Action
 from autopoly_env.mesh import PolyMesh, is_sane
-from autopoly_env.operators import OPERATORS
+from autopoly_env.operators import OPERATORS, Action
 from autopoly_env.score import Score
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence_ids import element_index

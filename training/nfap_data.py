@@ -17,10 +17,9 @@ import numpy as np
 from agents.base import Budget
 from agents.registry import make_agent
 from agents.search.evaluator import ResidualEvaluator
-from autopoly_env.actions import Action
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh, is_sane
-from autopoly_env.operators import OPERATORS
+from autopoly_env.operators import OPERATORS, Action
 from autopoly_env.score import Score, ScoreWeights
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence_ids import element_index

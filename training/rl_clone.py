@@ -30,11 +30,10 @@ from agents.rl.config import NetConfig, Rules
 from agents.rl.network import NEVER, MeshNet, observer_of
 from agents.rl.player import observation_of
 from agents.rl.weights import save_policy
-from autopoly_env.actions import Action, ActionCodec
 from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.files import write_atomically
 from autopoly_env.observation import PADDING, Observation
-from autopoly_env.operators import OPERATORS
+from autopoly_env.operators import OPERATORS, Action, ActionCodec
 from training.net_metrics import mean_rows
 from training.options import plain, read_config
 from training.rl_config import EnvConfig

@@ -10,9 +10,9 @@ import numpy as np
 
 from agents.rl.network import MeshNet
 from agents.rl.player import Player
-from autopoly_env.actions import STOP, Action
 from autopoly_env.compute import Routine, run_all
 from autopoly_env.errors import IllegalActionError
+from autopoly_env.operators import STOP, Action
 from autopoly_env.score import ScoreWeights
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator, State

@@ -18,11 +18,10 @@ from agents.guided.config import CLASSES, STOP_CLASS, NfapConfig, WarpConfig, cl
 from agents.guided.measures import candidate_arrays
 from agents.guided.pictures import draw_inputs, rendering
 from agents.guided.regions import region_image
-from autopoly_env.actions import STOP, Action
 from autopoly_env.compute import set_threads
 from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import OPERATORS
+from autopoly_env.operators import OPERATORS, STOP, Action
 from autopoly_env.placement import Disagreement, starts
 from training.nfap_data import SourceConfig, build_trajectory
 from training.trajectories import Labelled, Shard, Trajectory

@@ -16,12 +16,11 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from autopoly_env.actions import Action
 from autopoly_env.arrays import BoolArray
 from autopoly_env.errors import ConfigError
 from autopoly_env.files import write_atomically
 from autopoly_env.mesh import PolyMesh, Topology
-from autopoly_env.operators import OPERATORS
+from autopoly_env.operators import OPERATORS, Action
 from autopoly_env.silhouette import Silhouette
 
 VERSION = 1

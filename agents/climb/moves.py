@@ -8,8 +8,8 @@ import shapely
 
 from agents.trace.outline import Outline, outline_of
 from agents.trace.rings import Ring, signed_area
-from autopoly_env.actions import Action
 from autopoly_env.arrays import FloatArray
+from autopoly_env.operators import Action
 from autopoly_env.placement import Disagreement, hole_shapes, starts
 from autopoly_env.silhouette import Silhouette
 

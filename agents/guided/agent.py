@@ -10,9 +10,9 @@ from agents.base import Agent, Decision, Meter, Track
 from agents.extras import require
 from agents.guided.config import NfapMctsConfig, NfapPriorConfig
 from agents.search.mcts import MctsAgent
-from autopoly_env.actions import STOP
 from autopoly_env.compute import n_threads
 from autopoly_env.errors import ConfigError
+from autopoly_env.operators import STOP
 from autopoly_env.simulator import Simulator, State
 
 if TYPE_CHECKING:

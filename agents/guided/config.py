@@ -7,10 +7,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from agents.search.config import MctsConfig
-from autopoly_env.actions import STOP, Action
-from autopoly_env.edits import HOLE_SIDES
 from autopoly_env.errors import ConfigError
-from autopoly_env.operators import OPERATORS
+from autopoly_env.operators import HOLE_SIDES, OPERATORS, STOP, Action
 
 Input = Literal["current", "target", "difference", "edges", "vertices"]
 Regions = Literal["one", "each"]

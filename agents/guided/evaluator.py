@@ -21,11 +21,10 @@ from agents.guided.pictures import draw_inputs, rendering
 from agents.guided.warp import WarpNet
 from agents.guided.weights import NetworkMeta
 from agents.search.evaluator import ResidualEvaluator
-from autopoly_env.actions import Action
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import IllegalActionError
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import OPERATORS, Choice
+from autopoly_env.operators import OPERATORS, Action, Choice
 from autopoly_env.placement import Disagreement, starts
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator, State

@@ -11,11 +11,9 @@ from numpy.typing import NDArray
 
 from agents.guided.config import class_of
 from agents.guided.regions import N_POINTS, action_points
-from autopoly_env.actions import Action
 from autopoly_env.arrays import FloatArray
-from autopoly_env.edits import HOLE_SIDES
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import OPERATORS
+from autopoly_env.operators import HOLE_SIDES, OPERATORS, Action
 from autopoly_env.placement import Disagreement
 from autopoly_env.placement_kernels import AREA, DEPTH, MASS
 

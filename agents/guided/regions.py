@@ -11,11 +11,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from agents.guided.pictures import Picture
-from autopoly_env.actions import Action
 from autopoly_env.arrays import FloatArray
-from autopoly_env.edits import HOLE_SIDES
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import OPERATORS
+from autopoly_env.operators import HOLE_SIDES, OPERATORS, Action
 from autopoly_env.raster import Batch, coverage_of_batch
 
 N_POINTS = 8

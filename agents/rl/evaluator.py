@@ -10,10 +10,10 @@ import numpy as np
 
 from agents.rl.player import Player
 from agents.search.evaluator import UniformEvaluator
-from autopoly_env.actions import Action
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.mesh import PolyMesh
+from autopoly_env.operators import Action
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator, State
 

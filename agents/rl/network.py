@@ -20,10 +20,8 @@ from torch.nn import functional
 from agents.rl import reading
 from agents.rl.config import NetConfig, Rules
 from agents.rl.links import Links, averaged, links_of, summed, taken
-from autopoly_env.actions import Action, ActionCodec
-from autopoly_env.edits import HOLE_SIDES
 from autopoly_env.observation import Observer
-from autopoly_env.operators import OPERATORS
+from autopoly_env.operators import HOLE_SIDES, OPERATORS, Action, ActionCodec
 
 NEVER = -1e8  # logit of what is not legal
 N_FACTS = 10  # numbers about the whole, beside the pictures

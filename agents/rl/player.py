@@ -11,10 +11,10 @@ import torch
 
 from agents.base import Meter, Track
 from agents.rl.network import NEVER, MeshNet, observer_of
-from autopoly_env.actions import STOP, Action, ActionCodec
 from autopoly_env.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from autopoly_env.errors import IllegalActionError
 from autopoly_env.observation import Observation
+from autopoly_env.operators import STOP, Action, ActionCodec
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator, State
 

@@ -5,9 +5,8 @@ from typing import Protocol
 
 import numpy as np
 
-from autopoly_env.actions import Action
 from autopoly_env.arrays import FloatArray
-from autopoly_env.edits import HOLE_SIDES
+from autopoly_env.operators import HOLE_SIDES, Action
 from autopoly_env.placement import Disagreement
 from autopoly_env.placement_kernels import AREA, MASS
 from autopoly_env.simulator import Simulator, State

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from agents.base import Agent, Meter, Progress, Solution, Track
-from autopoly_env.actions import Action
+from autopoly_env.operators import Action
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence_ids import decoded
 from autopoly_env.simulator import Simulator

@@ -18,7 +18,7 @@ from agents.search.evaluator import Evaluator, ResidualEvaluator, UniformEvaluat
 from agents.search.incumbents import play, track_of
 from agents.search.search import Search
 from agents.search.tree import Node
-from autopoly_env.actions import STOP
+from autopoly_env.operators import STOP
 from autopoly_env.simulator import Simulator, State
 
 _EVALUATORS: dict[str, type[UniformEvaluator]] = {"residual": ResidualEvaluator, "uniform": UniformEvaluator}

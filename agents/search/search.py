@@ -11,8 +11,8 @@ from agents.search.evaluator import Evaluator
 from agents.search.selection import FORMULAS, best_half, halving_schedule, select_child
 from agents.search.simulation import roll_out, value_of
 from agents.search.tree import Node, ValueRange
-from autopoly_env.actions import Action
 from autopoly_env.mesh import canonical_hash
+from autopoly_env.operators import Action
 from autopoly_env.simulator import Simulator, State
 
 _MERGE_GRID = 1 / 128  # shapes that agree to this length (unit square) count as one

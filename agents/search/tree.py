@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from agents.base import Track
-from autopoly_env.actions import Action
 from autopoly_env.arrays import FloatArray
+from autopoly_env.operators import Action
 
 
 @dataclass(eq=False)

@@ -12,13 +12,10 @@ import shapely
 
 from agents.trace.peel_kernels import peel
 from agents.trace.rings import Ring
-from autopoly_env.actions import Action
 from autopoly_env.arrays import FloatArray
-from autopoly_env.edits import Choice
 from autopoly_env.errors import AutoPolyError, IllegalActionError
-from autopoly_env.holes import HoleChoice, plan_hole
 from autopoly_env.mesh import PolyMesh, is_sane
-from autopoly_env.operators import OPERATORS
+from autopoly_env.operators import OPERATORS, Action, Choice, HoleChoice, plan_hole
 from autopoly_env.simulator import Simulator, State
 
 _N_NATURAL_TRIES = 200  # ways to grow a further part out of the mesh that are tried before it is put in place at once

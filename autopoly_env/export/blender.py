@@ -5,13 +5,12 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from autopoly_env.edits import HOLE_SIDES
 from autopoly_env.errors import SequenceError
 from autopoly_env.export.replay import finite_meshes, sequence_name, unmoved
 from autopoly_env.export.solid import check_depth
 from autopoly_env.files import write_atomically
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import OPERATORS, Operator
+from autopoly_env.operators import HOLE_SIDES, OPERATORS, Operator
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence_file import Step, parse_hole
 from autopoly_env.sequence_ids import element_index

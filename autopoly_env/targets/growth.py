@@ -9,12 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from autopoly_env.actions import Action
 from autopoly_env.arrays import FloatArray
-from autopoly_env.edits import HOLE_SIDES, Choice
-from autopoly_env.holes import HoleChoice, plan_hole
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import OPERATORS
+from autopoly_env.operators import HOLE_SIDES, OPERATORS, Action, Choice, HoleChoice, plan_hole
 from autopoly_env.raster import coverage
 from autopoly_env.targets.construction_kernels import clearance, is_clear
 from autopoly_env.targets.dice import Dice

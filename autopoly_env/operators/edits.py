@@ -12,10 +12,10 @@ import numpy as np
 
 from autopoly_env.arrays import BoolArray, FloatArray
 from autopoly_env.errors import IllegalActionError
-from autopoly_env.hole_kernels import roomy_faces
-from autopoly_env.holes import HoleChoice, default_hole, hole_defect
 from autopoly_env.mesh import Face, PolyMesh, Topology
 from autopoly_env.mesh.planar_kernels import clear_extrusion, split_imbalance, splittable_corners
+from autopoly_env.operators.hole_kernels import roomy_faces
+from autopoly_env.operators.holes import HoleChoice, default_hole, hole_defect
 
 Choice = int | HoleChoice
 HOLE_SIDES = (3, 4)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from autopoly_env.arrays import BoolArray
-from autopoly_env.edits import HOLE_SIDES
 from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import OPERATORS, Operator, n_elements
+from autopoly_env.operators.edits import HOLE_SIDES
+from autopoly_env.operators.registry import OPERATORS, Operator, n_elements
 
 CAPACITY_PER_VERTEX = {"vertex": 1, "edge": 2, "face": 1, "corner": 4, "hole": len(HOLE_SIDES)}
 

@@ -12,15 +12,15 @@ import numpy.typing as npt
 import shapely
 
 from autopoly_env.arrays import FloatArray, IntArray
-from autopoly_env.hole_kernels import (
+from autopoly_env.mesh import PolyMesh
+from autopoly_env.mesh.planar_kernels import arc_area, segments_touch
+from autopoly_env.operators.hole_kernels import (
     best_bridges,
     free_bridges,
     is_free_bridge,
     is_ring_inside,
     is_simple_ring,
 )
-from autopoly_env.mesh import PolyMesh
-from autopoly_env.mesh.planar_kernels import arc_area, segments_touch
 
 BALANCE_WEIGHT = 0.25  # what a wholly one-sided cut costs, in lengths of the square root of the face's area
 Bridge = tuple[int, int]

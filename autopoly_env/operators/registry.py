@@ -9,12 +9,12 @@ and ids. Names and effects are those of Blender's operators (`subdivide_edges`, 
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from autopoly_env import edits
 from autopoly_env.arrays import BoolArray
-from autopoly_env.edits import Choice
 from autopoly_env.errors import ConfigError
-from autopoly_env.holes import HoleChoice, plan_hole
 from autopoly_env.mesh import PolyMesh
+from autopoly_env.operators import edits
+from autopoly_env.operators.edits import Choice
+from autopoly_env.operators.holes import HoleChoice, plan_hole
 
 __all__ = ["OPERATORS", "PRESETS", "Choice", "HoleChoice", "Operator", "n_elements", "plan_hole", "preset"]
 
