@@ -8,8 +8,8 @@ import torch
 
 from autopoly_env.arrays import FloatArray
 from autopoly_env.mesh import PolyMesh, is_sane
+from autopoly_env.raster import coverage
 from autopoly_env.silhouette import Target
-from autopoly_env.torch_raster import coverage
 
 
 class Descent:

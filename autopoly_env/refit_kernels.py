@@ -11,9 +11,9 @@ import numpy as np
 
 from autopoly_env.arrays import BoolArray, FloatArray, IntArray
 from autopoly_env.compute import kernel
-from autopoly_env.derivative_kernels import half_gradient, normal_equations
 from autopoly_env.mesh.geometry_kernels import defects
-from autopoly_env.raster_kernels import Workspace
+from autopoly_env.raster.derivative_kernels import half_gradient, normal_equations
+from autopoly_env.raster.raster_kernels import Workspace
 
 _FIRST_RATE, _LAST_RATE = 2.0 / 64.0, 0.1 / 64.0  # of the far phase, in unit-square lengths
 _IDLE_SHARE = 0.03  # of the steepest slope: below it the far phase slows down, or idle vertices would race along edges

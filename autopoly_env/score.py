@@ -6,11 +6,10 @@ from itertools import combinations
 import numpy as np
 import shapely
 
-from autopoly_env import raster_kernels
 from autopoly_env.arrays import IntArray
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh, geometry_kernels
-from autopoly_env.raster import workspace
+from autopoly_env.raster import raster_kernels, workspace
 from autopoly_env.silhouette import Target
 
 

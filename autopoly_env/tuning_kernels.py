@@ -11,7 +11,7 @@ import numpy as np
 from autopoly_env.arrays import BoolArray, FloatArray, IntArray
 from autopoly_env.compute import kernel
 from autopoly_env.mesh.geometry_kernels import defects
-from autopoly_env.raster_kernels import Workspace, overlap_counts_in_rows
+from autopoly_env.raster.raster_kernels import Workspace, overlap_counts_in_rows
 from autopoly_env.refit_kernels import Shape
 
 _STEPS = (2.0, 1.0, 0.5, 0.25)  # pixels

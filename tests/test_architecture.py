@@ -18,7 +18,7 @@ GYMNASIUM_SHELL = tuple(f"autopoly_env/{name}" for name in ("__init__", "env", "
 LINES = [
     ("agents", ("autopoly_env",), ()),
     ("training", ("autopoly_env", "agents"), ()),
-    ("torch", ("autopoly_env",), ("autopoly_env/torch_raster",)),
+    ("torch", ("autopoly_env",), ("autopoly_env/raster/autograd",)),
     ("gymnasium", ROOMS, (*GYMNASIUM_SHELL, "agents/rl")),
     ("stable_baselines3", ROOMS, ("agents/rl", "training/train_rl")),
     ("sb3_contrib", ROOMS, ("agents/rl", "training/train_rl")),

@@ -16,7 +16,7 @@ from PIL import Image
 from agents.base import Budget, Meter, Solution, finish
 from agents.registry import AGENTS, make_agent
 from agents.solve import main
-from autopoly_env import derivative_kernels, raster, refit_kernels
+from autopoly_env import refit_kernels
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import ConfigError, IllegalActionError, MeshError
 from autopoly_env.export import from_obj, load_obj, to_obj
@@ -25,7 +25,8 @@ from autopoly_env.mesh import PolyMesh, defects_of, is_valid
 from autopoly_env.operators import STOP, Action, legal_actions
 from autopoly_env.placement import Disagreement
 from autopoly_env.placement_kernels import MASS, MEAN_X
-from autopoly_env.raster import coverage, loss_and_gradient, loss_and_gradient_many
+from autopoly_env.raster import coverage, derivative_kernels, loss_and_gradient, loss_and_gradient_many
+from autopoly_env.raster import rasteriser as raster
 from autopoly_env.refit import FROM_AFAR, Bonds, RefitTarget, refit
 from autopoly_env.score import intersection_over_union
 from autopoly_env.sequence import ConstructionSequence

@@ -13,13 +13,21 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopoly_env import derivative_kernels, raster, raster_kernels
 from autopoly_env.arrays import FloatArray, IntArray
 from autopoly_env.compute import set_threads
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import OPERATORS
-from autopoly_env.raster import Batch, coverage, coverage_many, loss_and_gradient, loss_and_gradient_many
+from autopoly_env.raster import (
+    Batch,
+    coverage,
+    coverage_many,
+    derivative_kernels,
+    loss_and_gradient,
+    loss_and_gradient_many,
+    raster_kernels,
+)
+from autopoly_env.raster import rasteriser as raster
 from autopoly_env.silhouette import Target
 from tests.shapes import (
     central_differences,

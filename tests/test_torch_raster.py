@@ -16,8 +16,8 @@ pytest.importorskip("torch")
 
 import torch
 
-from autopoly_env import raster
-from autopoly_env.torch_raster import coverage
+from autopoly_env.raster import coverage
+from autopoly_env.raster import rasteriser as raster
 
 RING = frame(star(3, 5), 0.5 + 0.4 * (star(3, 5) - 0.5))
 

@@ -13,7 +13,7 @@ from numba.cpython.unsafe.numbers import trailing_zeros
 
 from autopoly_env.arrays import FloatArray, IntArray
 from autopoly_env.compute import kernel
-from autopoly_env.raster_kernels import (
+from autopoly_env.raster.raster_kernels import (
     AREA,
     COVER,
     EDGE,

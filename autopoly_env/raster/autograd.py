@@ -10,7 +10,7 @@ import torch
 
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import ConfigError
-from autopoly_env.raster import Batch, coverage_of_batch, coverage_vjp
+from autopoly_env.raster.rasteriser import Batch, coverage_of_batch, coverage_vjp
 
 
 class _Coverage(torch.autograd.Function):

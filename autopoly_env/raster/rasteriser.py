@@ -13,12 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from autopoly_env import derivative_kernels, raster_kernels
 from autopoly_env.arrays import FloatArray, IntArray
 from autopoly_env.compute import map_threads, n_threads
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.raster_kernels import Workspace
+from autopoly_env.raster import derivative_kernels, raster_kernels
+from autopoly_env.raster.raster_kernels import Workspace
 from autopoly_env.silhouette import Target
 
 _local = threading.local()
