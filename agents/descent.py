@@ -8,7 +8,7 @@ import torch
 
 from autopoly_env.arrays import FloatArray
 from autopoly_env.mesh import PolyMesh, is_sane
-from autopoly_env.raster import coverage
+from autopoly_env.raster.autograd import coverage
 from autopoly_env.silhouette import Target
 
 

@@ -9,7 +9,7 @@ import shapely
 from autopoly_env.arrays import IntArray
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh, geometry_kernels
-from autopoly_env.raster import raster_kernels, workspace
+from autopoly_env.raster import pixels_of, raster_kernels, workspace
 from autopoly_env.silhouette import Target
 
 
@@ -58,9 +58,7 @@ def intersection_over_union(mesh: PolyMesh, target: Target) -> float:
     """
     edges = mesh.topology.boundary_half_edges
     work = workspace(target.resolution, len(edges))
-    inside, filled = raster_kernels.overlap_counts(
-        mesh.vertices, edges, target.resolution, target.mask, target.mask_sum, work, target.weight_sum
-    )
+    inside, filled = raster_kernels.overlap_counts(mesh.vertices, edges, pixels_of(target), work)
     union = filled + target.n_filled - inside
     return float(inside / union) if union else 1.0
 

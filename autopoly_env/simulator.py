@@ -22,11 +22,10 @@ from autopoly_env.mesh import PolyMesh, defects_of
 from autopoly_env.mirror import Beginning, Halfway, mirrored_starts
 from autopoly_env.operators import STOP, Action, Choice, legal_actions, preset
 from autopoly_env.placement import Disagreement, leaves_outline_alone, starts
-from autopoly_env.refit import FROM_AFAR, LOCAL, THOROUGH, RefitConfig, RefitTarget, holding, refit
+from autopoly_env.refit import FROM_AFAR, LOCAL, THOROUGH, RefitConfig, RefitTarget, holding, refit, tune
 from autopoly_env.score import Score, ScoreWeights, score
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import Silhouette
-from autopoly_env.tuning import tune
 
 POLISH_RESOLUTION = 512  # of the finest refit; a score may be finer
 _N_REFINED = 3  # refits at it, each towards more than the IoU of the one before

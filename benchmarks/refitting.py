@@ -108,7 +108,7 @@ def _deodr_descent(start: PolyMesh, target: Target) -> Descent:
 def _torch_descent(start: PolyMesh, target: Target) -> Descent:
     """torch's own Adam, its fused kernel, on our differentiable coverage."""
     torch = import_module("torch")
-    coverage = import_module("autopoly_env.raster.rasteriser.autograd").coverage
+    coverage = import_module("autopoly_env.raster.autograd").coverage
     edges = torch.from_numpy(start.topology.boundary_half_edges.copy())
     wanted = torch.from_numpy(target.coverage.copy())[None]
     torch.set_num_threads(1)  # nothing here is large enough to share; waiting for a second thread costs milliseconds

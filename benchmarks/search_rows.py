@@ -14,9 +14,9 @@ import numpy as np
 from agents.base import Budget
 from agents.registry import AGENTS, make_agent
 from agents.search.config import MctsConfig
-from autopoly_env import refit_kernels, tuning
 from autopoly_env.arrays import FloatArray
 from autopoly_env.compute import set_threads
+from autopoly_env.refit import refit_kernels, tuning
 from benchmarks.report import Must, Row, not_measured
 from benchmarks.search_cases import Case, Results, made, measure, simulator_of, with_options
 from training.report.statistics import Interval, bootstrap_mean

@@ -12,8 +12,8 @@ import pytest
 
 from agents.base import Budget
 from agents.search.config import PAPER, MctsConfig
-from autopoly_env import refit_kernels
 from autopoly_env.errors import OutputError
+from autopoly_env.refit import refit_kernels
 from benchmarks import search, search_cases, search_rows
 from benchmarks.curve_picture import draw_curves
 from benchmarks.search_cases import Case, Found, Records, Results, best_of_plays, made, target_of

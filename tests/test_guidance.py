@@ -16,7 +16,6 @@ from PIL import Image
 from agents.base import Budget, Meter, Solution, finish
 from agents.registry import AGENTS, make_agent
 from agents.solve import main
-from autopoly_env import refit_kernels
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import ConfigError, IllegalActionError, MeshError
 from autopoly_env.export import from_obj, load_obj, to_obj
@@ -27,7 +26,7 @@ from autopoly_env.placement import Disagreement
 from autopoly_env.placement_kernels import MASS, MEAN_X
 from autopoly_env.raster import coverage, derivative_kernels, loss_and_gradient, loss_and_gradient_many
 from autopoly_env.raster import rasteriser as raster
-from autopoly_env.refit import FROM_AFAR, Bonds, RefitTarget, refit
+from autopoly_env.refit import FROM_AFAR, Bonds, RefitTarget, refit, shape_kernels
 from autopoly_env.score import intersection_over_union
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import Silhouette, Target, area_means, load_silhouette
@@ -112,10 +111,9 @@ def test_weighted_normal_equations__equal_those_of_the_dense_jacobian(mesh: Poly
     residual = (coverage(mesh, size) - target.coverage).ravel()
     weights = weights.ravel()
     gradient, normal = np.zeros((n, 2)), np.zeros((2 * n, 2 * n))
-    sums = (target.coverage, target.row_sum, target.row_square_sum)
     work = raster.workspace(size, len(batch.edges))
     loss = derivative_kernels.normal_equations(
-        batch.points, batch.edges, size, *sums, work, gradient, normal, target.weight_sum
+        batch.points, batch.edges, raster.picture_of(target), work, gradient, normal
     )
     assert loss == pytest.approx(weights @ residual**2, rel=1e-11)
     np.testing.assert_allclose(gradient.ravel(), jacobian.T @ (weights * residual), rtol=0, atol=1e-12)
@@ -331,7 +329,7 @@ def test_images__of_outlines_by_hand() -> None:
 def test_ties__are_the_linear_reduction_of_gradient_and_normal_matrix() -> None:
     """Unknowns 0 and 3 are images, 1 is on the axis, 2 is locked, 4 is free: x = R z, with z of 5 numbers."""
     leader, on_axis = np.array([0, 1, -1, 0, 4]), np.array([False, True, False, False, False])
-    ties = refit_kernels.Ties(leader, on_axis, 0.5)
+    ties = shape_kernels.Ties(leader, on_axis, 0.5)
     reduction = np.zeros((10, 5))
     for row, column, sign in ((0, 0, 1), (1, 1, 1), (6, 0, -1), (7, 1, 1), (3, 2, 1), (8, 3, 1), (9, 4, 1)):
         reduction[row, column] = sign
@@ -340,8 +338,8 @@ def test_ties__are_the_linear_reduction_of_gradient_and_normal_matrix() -> None:
     square = rng.random((10, 10))
     full, gradient = square @ square.T, rng.random((5, 2))
     normal, tied = np.tril(full), gradient.copy()
-    refit_kernels._tie_gradient(ties, tied)
-    refit_kernels._tie_normal(ties, normal)
+    shape_kernels.tie_gradient(ties, tied)
+    shape_kernels.tie_normal(ties, normal)
     np.testing.assert_allclose(tied.ravel()[leading], reduction.T @ gradient.ravel(), rtol=1e-13)
     np.testing.assert_allclose(
         np.tril(normal[np.ix_(leading, leading)]), np.tril(reduction.T @ full @ reduction), rtol=1e-12

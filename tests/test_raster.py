@@ -195,9 +195,7 @@ def test_calls__leave_nothing_behind_for_those_that_follow() -> None:
     def call_all(resolution: int) -> tuple[bytes, ...]:
         target, batch = targets[resolution], raster.batch_of([mesh])
         work = raster.workspace(resolution, n_edges)
-        counts = raster_kernels.overlap_counts(
-            batch.points, batch.edges, resolution, target.mask, target.mask_sum, work
-        )
+        counts = raster_kernels.overlap_counts(batch.points, batch.edges, raster.pixels_of(target), work)
         loss, gradient = loss_and_gradient(mesh, target)
         pulled = raster.coverage_vjp(batch, target.coverage[None].copy())
         assert_clean(resolution, n_edges)
@@ -296,8 +294,8 @@ def test_normal_equations__equal_those_of_the_dense_jacobian(mesh: PolyMesh) -> 
     residual = (coverage(mesh, size) - target.coverage).ravel()
     work = raster.workspace(size, len(batch.edges))
     gradient, normal = np.zeros((n, 2)), np.zeros((2 * n, 2 * n))
-    picture = (target.coverage, target.row_sum, target.row_square_sum)
-    loss = derivative_kernels.normal_equations(batch.points, batch.edges, size, *picture, work, gradient, normal)
+    picture = raster.picture_of(target)
+    loss = derivative_kernels.normal_equations(batch.points, batch.edges, picture, work, gradient, normal)
     assert_clean(size, len(batch.edges))
     assert loss == pytest.approx(residual @ residual, rel=1e-12)
     np.testing.assert_allclose(gradient.ravel(), jacobian.T @ residual, rtol=0, atol=1e-12)
@@ -310,9 +308,7 @@ def test_overlap_counts__are_those_of_the_thresholded_images(resolution: int) ->
     for mesh in (RING, hourglass(), RING.with_vertices(1.5 * RING.vertices - 0.4)):
         batch = raster.batch_of([mesh])
         work = raster.workspace(resolution, len(batch.edges))
-        inside, filled = raster_kernels.overlap_counts(
-            batch.points, batch.edges, resolution, target.mask, target.mask_sum, work
-        )
+        inside, filled = raster_kernels.overlap_counts(batch.points, batch.edges, raster.pixels_of(target), work)
         rendered = coverage(mesh, resolution) >= 0.5
         assert (inside, filled) == ((rendered & target.mask).sum(), rendered.sum())
         assert_clean(resolution, len(batch.edges))
@@ -328,7 +324,7 @@ def test_overlap_counts_in_rows__are_those_of_the_rows(resolution: int) -> None:
         rendered = coverage(mesh, resolution) >= 0.5
         for first, last in pairwise(cuts):
             inside, filled = raster_kernels.overlap_counts_in_rows(
-                batch.points, batch.edges, resolution, target.mask, target.mask_sum, work, None, first, last
+                batch.points, batch.edges, raster.pixels_of(target), work, first, last
             )
             band = slice(first, last)
             assert (inside, filled) == ((rendered & target.mask)[band].sum(), rendered[band].sum())

@@ -12,17 +12,9 @@ from autopoly_env.compute import set_threads
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.mesh.geometry_kernels import count_crossings
 from autopoly_env.raster import coverage
-from autopoly_env.refit import (
-    FROM_AFAR,
-    LOCAL,
-    RefitConfig,
-    RefitResult,
-    RefitTarget,
-    refit,
-    refit_many,
-    shape_of,
-)
-from autopoly_env.refit_kernels import Picture
+from autopoly_env.raster.raster_kernels import Picture
+from autopoly_env.refit import FROM_AFAR, LOCAL, RefitConfig, RefitResult, RefitTarget, refit, refit_many
+from autopoly_env.refit.refitting import shape_of
 from autopoly_env.silhouette import Silhouette, Target
 from tests.shapes import frame, hourglass, pairs_that_meet, polygon
 from tests.strategies import meshes, random_walk

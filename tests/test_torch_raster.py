@@ -16,8 +16,8 @@ pytest.importorskip("torch")
 
 import torch
 
-from autopoly_env.raster import coverage
 from autopoly_env.raster import rasteriser as raster
+from autopoly_env.raster.autograd import coverage
 
 RING = frame(star(3, 5), 0.5 + 0.4 * (star(3, 5) - 0.5))
 

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from autopoly_env.mesh import PolyMesh, is_sane
-from autopoly_env.refit import Bonds
+from autopoly_env.refit import Bonds, tune
 from autopoly_env.score import intersection_over_union
 from autopoly_env.silhouette import Silhouette, Target
-from autopoly_env.tuning import tune
 
 
 def target() -> Target:

@@ -13,7 +13,7 @@ from torch.nn import functional
 from agents.guided.config import WarpConfig
 from agents.guided.layers import Encoder
 from agents.guided.tps import control_grid, transport, warp_pictures
-from autopoly_env.raster import coverage
+from autopoly_env.raster.autograd import coverage
 
 
 class Theta(NamedTuple):

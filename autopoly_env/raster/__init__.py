@@ -1,14 +1,16 @@
-"""Exact area coverage of meshes on a pixel grid, and its exact derivatives."""
+"""Exact area coverage of meshes on a pixel grid, and its exact derivatives; `raster.autograd` has them for torch."""
 
-from autopoly_env.raster.autograd import coverage
-from autopoly_env.raster.derivative_kernels import loss_and_gradient
 from autopoly_env.raster.rasteriser import (
     Batch,
     batch_of,
+    coverage,
     coverage_many,
     coverage_of_batch,
     coverage_vjp,
+    loss_and_gradient,
     loss_and_gradient_many,
+    picture_of,
+    pixels_of,
     workspace,
 )
 
@@ -21,5 +23,7 @@ __all__ = [
     "coverage_vjp",
     "loss_and_gradient",
     "loss_and_gradient_many",
+    "picture_of",
+    "pixels_of",
     "workspace",
 ]

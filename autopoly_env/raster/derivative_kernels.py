@@ -3,9 +3,8 @@
 Only touched cells depend on the vertices; the rest of a row is constant spans, whose squared error prefix sums of the
 target give. Letters and units as in `raster_kernels`.
 
-Pixels may have weights: `weight_sum` (R, R+1) are prefix sums of them along the rows, and `row_sum` and
-`row_square_sum` are then those of weight * target and of weight * target**2. Without (None) every pixel weighs 1, and
-Numba compiles kernels that know of no weights.
+Pixels may have weights, which the prefix sums of a `Picture` then count. Without (None) every pixel weighs 1, and Numba
+compiles kernels that know of no weights.
 """
 
 import numpy as np
@@ -22,6 +21,7 @@ from autopoly_env.raster.raster_kernels import (
     NEXT,
     PADDING,
     START,
+    Picture,
     Workspace,
     clear,
     span_weight,
@@ -31,13 +31,10 @@ from autopoly_env.raster.raster_kernels import (
 
 @kernel
 def half_gradient(
-    points: FloatArray, edges: IntArray, size: int, coverage: FloatArray, row_sum: FloatArray,
-    row_square_sum: FloatArray, work: Workspace, gradient: FloatArray, weight_sum: FloatArray | None = None,
+    points: FloatArray, edges: IntArray, picture: Picture, work: Workspace, gradient: FloatArray
 ) -> float:  # fmt: skip
-    """Return the sum over pixels of (coverage - target)**2; write half its gradient per pixel into `gradient` (V, 2).
-
-    `coverage` (R, R) is the target, `row_sum` and `row_square_sum` (R, R+1) prefix sums of it and of its square.
-    """
+    """Return the sum over pixels of (coverage - target)**2; half its gradient per pixel goes into `gradient` (V, 2)."""
+    size = picture.coverage.shape[0]
     walk_boundary(points, edges, size, work, 0, size)
     words = (size + 63) >> 6
     gradient[:] = 0.0
@@ -53,15 +50,15 @@ def half_gradient(
                 bits &= bits - np.uint64(1)
                 cell = row * (size + PADDING) + here
                 if here > column:
-                    loss += _span_loss(total, row, column, here, row_sum, row_square_sum, weight_sum)
-                residual = total + work.cells[cell, AREA] - coverage[row, here]
+                    loss += _span_loss(total, row, column, here, picture)
+                residual = total + work.cells[cell, AREA] - picture.coverage[row, here]
                 total += work.cells[cell, COVER]
-                pull = _weighed(residual, row, here, weight_sum)
+                pull = _weighed(residual, row, here, picture.weight_sum)
                 loss += residual * pull
                 _pull(points, edges, size, cell, pull, work, gradient)
                 clear(cell, work)
                 column = here + 1
-        loss += _span_loss(total, row, column, size, row_sum, row_square_sum, weight_sum)
+        loss += _span_loss(total, row, column, size, picture)
     return loss if not loss < 0.0 else 0.0  # differences of prefix sums may round to less than nothing
 
 
@@ -74,15 +71,12 @@ def _weighed(residual: float, row: int, column: int, weight_sum: FloatArray | No
 
 
 @kernel
-def _span_loss(
-    total: float, row: int, first: int, last: int, row_sum: FloatArray, row_square_sum: FloatArray,
-    weight_sum: FloatArray | None,
-) -> float:  # fmt: skip
+def _span_loss(total: float, row: int, first: int, last: int, picture: Picture) -> float:
     """Squared error of the untouched pixels first..last-1 of a row, which the mesh covers `total` times."""
     return (
-        total * total * span_weight(row, first, last, weight_sum)
-        - 2.0 * total * (row_sum[row, last] - row_sum[row, first])
-        + (row_square_sum[row, last] - row_square_sum[row, first])
+        total * total * span_weight(row, first, last, picture.weight_sum)
+        - 2.0 * total * (picture.row_sum[row, last] - picture.row_sum[row, first])
+        + (picture.row_square_sum[row, last] - picture.row_square_sum[row, first])
     )
 
 
@@ -106,11 +100,11 @@ def _pull(
 
 @kernel
 def loss_and_gradient(
-    points: FloatArray, edges: IntArray, size: int, coverage: FloatArray, row_sum: FloatArray,
-    row_square_sum: FloatArray, work: Workspace, gradient: FloatArray, weight_sum: FloatArray | None = None,
+    points: FloatArray, edges: IntArray, picture: Picture, work: Workspace, gradient: FloatArray
 ) -> float:  # fmt: skip
     """Sum of squared coverage errors; its gradient with respect to unit-square positions goes into `gradient`."""
-    loss = half_gradient(points, edges, size, coverage, row_sum, row_square_sum, work, gradient, weight_sum)
+    loss = half_gradient(points, edges, picture, work, gradient)
+    size = picture.coverage.shape[0]
     for v in range(gradient.shape[0]):
         gradient[v, 0] *= 2.0 * size
         gradient[v, 1] *= 2.0 * size
@@ -119,11 +113,10 @@ def loss_and_gradient(
 
 @kernel
 def normal_equations(
-    points: FloatArray, edges: IntArray, size: int, coverage: FloatArray, row_sum: FloatArray,
-    row_square_sum: FloatArray, work: Workspace, gradient: FloatArray, normal: FloatArray,
-    weight_sum: FloatArray | None = None,
-) -> float:  # fmt: skip
+    points: FloatArray, edges: IntArray, picture: Picture, work: Workspace, gradient: FloatArray, normal: FloatArray
+) -> float:
     """As `half_gradient`, and write the lower triangle of J'WJ (2V, 2V): unknown 2v is x of vertex v, 2v+1 its y."""
+    size = picture.coverage.shape[0]
     walk_boundary(points, edges, size, work, 0, size)
     words = (size + 63) >> 6
     vertices = np.empty(points.shape[0], np.int64)
@@ -142,16 +135,16 @@ def normal_equations(
                 bits &= bits - np.uint64(1)
                 cell = row * (size + PADDING) + here
                 if here > column:
-                    loss += _span_loss(total, row, column, here, row_sum, row_square_sum, weight_sum)
-                residual = total + work.cells[cell, AREA] - coverage[row, here]
+                    loss += _span_loss(total, row, column, here, picture)
+                residual = total + work.cells[cell, AREA] - picture.coverage[row, here]
                 total += work.cells[cell, COVER]
                 m = _cell_jacobian(points, edges, size, cell, work, vertices, rows)
-                residual = _scaled_row(m, residual, row, here, rows, weight_sum)
+                residual = _scaled_row(m, residual, row, here, rows, picture.weight_sum)
                 loss += residual * residual
                 _add_outer_product(m, residual, vertices, rows, gradient, normal)
                 clear(cell, work)
                 column = here + 1
-        loss += _span_loss(total, row, column, size, row_sum, row_square_sum, weight_sum)
+        loss += _span_loss(total, row, column, size, picture)
     return loss if not loss < 0.0 else 0.0
 
 
@@ -247,22 +240,16 @@ def vector_jacobian(
 @kernel
 def losses_and_gradients(
     points: FloatArray, edges: IntArray, point_starts: IntArray, edge_starts: IntArray, first: int, last: int,
-    coverage: FloatArray, row_sum: FloatArray, row_square_sum: FloatArray, work: Workspace,
-    losses: FloatArray, gradients: FloatArray, weight_sum: FloatArray | None = None,
+    picture: Picture, work: Workspace, losses: FloatArray, gradients: FloatArray,
 ) -> None:  # fmt: skip
     """`loss_and_gradient` of meshes first..last of a batch, all against one target."""
-    size = coverage.shape[0]
     for k in range(first, last):
         losses[k] = loss_and_gradient(
             points[point_starts[k] : point_starts[k + 1]],
             edges[edge_starts[k] : edge_starts[k + 1]],
-            size,
-            coverage,
-            row_sum,
-            row_square_sum,
+            picture,
             work,
             gradients[point_starts[k] : point_starts[k + 1]],
-            weight_sum,
         )
 
 

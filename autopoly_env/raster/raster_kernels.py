@@ -29,6 +29,23 @@ class Workspace(NamedTuple):
     pieces: FloatArray  # (P, 4) EDGE, integrals START of (1 - t) and END of t, NEXT piece of the same cell
 
 
+class Picture(NamedTuple):
+    """A target as it is compared with a rendering, pixel by pixel: see `autopoly_env.silhouette.Target`."""
+
+    coverage: FloatArray  # (R, R)
+    row_sum: FloatArray  # (R, R+1) prefix sums of it along the rows
+    row_square_sum: FloatArray  # (R, R+1) the same of its square
+    weight_sum: FloatArray | None = None  # (R, R+1) of the pixels' weights, which the two sums above then count, too
+
+
+class Pixels(NamedTuple):
+    """A target as the IoU counts it: see `autopoly_env.silhouette.Target`."""
+
+    mask: BoolArray  # (R, R)
+    mask_sum: IntArray | FloatArray  # (R, R+1) prefix sums of it along the rows, of the weights if there are any
+    weight_sum: FloatArray | None = None  # (R, R+1)
+
+
 AREA, COVER, HEAD = 0, 1, 2  # HEAD is 1 + the cell's first piece, 0 for none
 EDGE, START, END, NEXT = 0, 1, 2, 3
 PADDING = 8
@@ -197,23 +214,18 @@ def span_weight(row: int, first: int, last: int, weight_sum: FloatArray | None) 
 
 
 @kernel
-def overlap_counts(
-    points: FloatArray, edges: IntArray, size: int, mask: BoolArray, mask_sum: IntArray | FloatArray, work: Workspace,
-    weight_sum: FloatArray | None = None,
-) -> tuple[float, float]:  # fmt: skip
-    """Pixels with coverage >= 0.5: (those inside the target mask, all of them). `mask_sum` (R, R+1) along rows.
-
-    With `weight_sum` they are not counted but weighed, and `mask_sum` is of the weights, too.
-    """
-    return overlap_counts_in_rows(points, edges, size, mask, mask_sum, work, weight_sum, 0, size)
+def overlap_counts(points: FloatArray, edges: IntArray, pixels: Pixels, work: Workspace) -> tuple[float, float]:
+    """Pixels with coverage >= 0.5: (those inside the target mask, all of them); weighed where pixels have weights."""
+    return overlap_counts_in_rows(points, edges, pixels, work, 0, pixels.mask.shape[0])
 
 
 @kernel
 def overlap_counts_in_rows(
-    points: FloatArray, edges: IntArray, size: int, mask: BoolArray, mask_sum: IntArray | FloatArray, work: Workspace,
-    weight_sum: FloatArray | None, first_row: int, last_row: int,
-) -> tuple[float, float]:  # fmt: skip
+    points: FloatArray, edges: IntArray, pixels: Pixels, work: Workspace, first_row: int, last_row: int
+) -> tuple[float, float]:
     """`overlap_counts` of rows first_row..last_row-1 alone, at the cost of what lies in them."""
+    mask, mask_sum, weight_sum = pixels
+    size = mask.shape[0]
     walk_boundary(points, edges, size, work, first_row, last_row)
     words = (size + 63) >> 6
     inside, filled = 0, 0

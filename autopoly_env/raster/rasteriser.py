@@ -18,7 +18,7 @@ from autopoly_env.compute import map_threads, n_threads
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.raster import derivative_kernels, raster_kernels
-from autopoly_env.raster.raster_kernels import Workspace
+from autopoly_env.raster.raster_kernels import Picture, Pixels, Workspace
 from autopoly_env.silhouette import Target
 
 _local = threading.local()
@@ -57,6 +57,16 @@ def coverage(mesh: PolyMesh, resolution: int) -> FloatArray:
     return image
 
 
+def picture_of(target: Target) -> Picture:
+    """The target as the kernels of derivatives read it."""
+    return Picture(target.coverage, target.row_sum, target.row_square_sum, target.weight_sum)
+
+
+def pixels_of(target: Target) -> Pixels:
+    """The target as the kernels that count pixels read it."""
+    return Pixels(target.mask, target.mask_sum, target.weight_sum)
+
+
 def loss_and_gradient(mesh: PolyMesh, target: Target) -> tuple[float, FloatArray]:
     """Sum over pixels of (coverage - target)**2, and its gradient (V, 2) with respect to the vertex positions.
 
@@ -68,13 +78,9 @@ def loss_and_gradient(mesh: PolyMesh, target: Target) -> tuple[float, FloatArray
     loss = derivative_kernels.loss_and_gradient(
         mesh.vertices,
         edges,
-        target.resolution,
-        target.coverage,
-        target.row_sum,
-        target.row_square_sum,
+        picture_of(target),
         workspace(target.resolution, len(edges)),
         gradient,
-        target.weight_sum,
     )
     return loss, gradient
 
@@ -127,13 +133,11 @@ def loss_and_gradient_many(meshes: Sequence[PolyMesh], target: Target) -> tuple[
         return np.empty(0), []
     batch = batch_of(meshes)
     losses, gradients = np.empty(len(batch)), np.empty_like(batch.points)
-    picture = (target.coverage, target.row_sum, target.row_square_sum)
+    picture = picture_of(target)
 
     def evaluate(first: int, last: int) -> None:
         work = workspace(target.resolution, _most_edges(batch))
-        derivative_kernels.losses_and_gradients(
-            *batch, first, last, *picture, work, losses, gradients, target.weight_sum
-        )
+        derivative_kernels.losses_and_gradients(*batch, first, last, picture, work, losses, gradients)
 
     _for_each_part(evaluate, batch, target.resolution)
     starts = batch.point_starts.tolist()

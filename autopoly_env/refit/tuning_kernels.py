@@ -4,29 +4,18 @@ A refit fits coverage, and the score counts pixels that are covered by half or m
 some tenths of a point.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
-from autopoly_env.arrays import BoolArray, FloatArray, IntArray
+from autopoly_env.arrays import FloatArray, IntArray
 from autopoly_env.compute import kernel
 from autopoly_env.mesh.geometry_kernels import defects
-from autopoly_env.raster.raster_kernels import Workspace, overlap_counts_in_rows
-from autopoly_env.refit_kernels import Shape
+from autopoly_env.raster.raster_kernels import Pixels, Workspace, overlap_counts_in_rows
+from autopoly_env.refit.shape_kernels import Shape
 
 _STEPS = (2.0, 1.0, 0.5, 0.25)  # pixels
 _N_DIRECTIONS = 8
 _N_ROUNDS = 4  # with one step, at most
 _LEAST_GAIN = 1e-12  # of the IoU; less is rounding of weights
-
-
-class Pixels(NamedTuple):
-    """What the IoU is counted on: see `autopoly_env.silhouette.Target`."""
-
-    mask: BoolArray  # (R, R)
-    mask_sum: IntArray | FloatArray  # (R, R+1)
-    n_filled: float
-    weight_sum: FloatArray | None  # (R, R+1)
 
 
 @kernel
@@ -42,34 +31,25 @@ def _rows_around(v: int, image: int, points: FloatArray, edges: IntArray, margin
 
 
 @kernel
-def _counts(
-    points: FloatArray, edges: IntArray, pixels: Pixels, work: Workspace, first: int, last: int
-) -> tuple[float, float]:
-    """What the mesh covers in rows first to last - 1: of the target, and in all."""
-    size = pixels.mask.shape[0]
-    return overlap_counts_in_rows(
-        points, edges, size, pixels.mask, pixels.mask_sum, work, pixels.weight_sum, first, last
-    )
-
-
-@kernel
-def _iou(inside: float, filled: float, pixels: Pixels) -> float:
-    union = filled + pixels.n_filled - inside
+def _iou(inside: float, filled: float, n_filled: float) -> float:
+    union = filled + n_filled - inside
     return inside / union if union > 0 else 1.0
 
 
 @kernel
 def tune(
-    points: FloatArray, edges: IntArray, shape: Shape, images: IntArray, axis: float, pixels: Pixels, work: Workspace
-) -> None:
+    points: FloatArray, edges: IntArray, shape: Shape, images: IntArray, axis: float, pixels: Pixels,
+    n_filled: float, work: Workspace,
+) -> None:  # fmt: skip
     """Move `points` (V, 2), in place, by pattern search on the IoU.
 
     `edges` (B, 2) are the boundary's. `images` (V,) holds each vertex's mirror image about x = `axis`, -1 for a vertex
-    that has none, -2 for one that stays. No crossing and no flipped face comes about, and nothing leaves the picture.
-    A vertex changes the rows only that its edges cross, so those are all that is counted again.
+    that has none, -2 for one that stays; `n_filled` is what the target's pixels weigh together. No crossing and no
+    flipped face comes about, and nothing leaves the picture. A vertex changes the rows only that its edges cross, so
+    those are all that is counted again.
     """
     size = pixels.mask.shape[0]
-    inside, filled = _counts(points, edges, pixels, work, 0, size)
+    inside, filled = overlap_counts_in_rows(points, edges, pixels, work, 0, size)
     crossings, flipped = defects(points, shape.edges, shape.corners, shape.offsets)
     for step in _STEPS:
         for _round in range(_N_ROUNDS):
@@ -80,7 +60,7 @@ def tune(
                 if image == -2:
                     continue
                 first, last = _rows_around(v, image, points, edges, step / size, size)
-                part_inside, part_filled = _counts(points, edges, pixels, work, first, last)
+                part_inside, part_filled = overlap_counts_in_rows(points, edges, pixels, work, first, last)
                 for direction in range(_N_DIRECTIONS):
                     angle = 2.0 * np.pi * direction / _N_DIRECTIONS
                     x, y = points[v, 0], points[v, 1]
@@ -92,16 +72,16 @@ def tune(
                     points[v, 0], points[v, 1] = new_x, new_y
                     if image >= 0 and image != v:
                         points[image, 0], points[image, 1] = 2.0 * axis - new_x, new_y
-                    new_inside, new_filled = _counts(points, edges, pixels, work, first, last)
+                    new_inside, new_filled = overlap_counts_in_rows(points, edges, pixels, work, first, last)
                     gain_inside, gain_filled = new_inside - part_inside, new_filled - part_filled
-                    iou = _iou(inside + gain_inside, filled + gain_filled, pixels)
-                    if iou > _iou(inside, filled, pixels) + _LEAST_GAIN:
+                    iou = _iou(inside + gain_inside, filled + gain_filled, n_filled)
+                    if iou > _iou(inside, filled, n_filled) + _LEAST_GAIN:
                         now_crossings, now_flipped = defects(points, shape.edges, shape.corners, shape.offsets)
                         if now_crossings <= crossings and now_flipped <= flipped:
                             inside, filled = inside + gain_inside, filled + gain_filled
                             n_moved += 1
                             first, last = _rows_around(v, image, points, edges, step / size, size)
-                            part_inside, part_filled = _counts(points, edges, pixels, work, first, last)
+                            part_inside, part_filled = overlap_counts_in_rows(points, edges, pixels, work, first, last)
                             continue
                     if image >= 0:
                         points[image, 0], points[image, 1] = other_x, other_y

@@ -3,11 +3,10 @@
 import numpy as np
 
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.raster import workspace
-from autopoly_env.refit import Bonds, shape_of
+from autopoly_env.raster import pixels_of, workspace
+from autopoly_env.refit.refitting import Bonds, shape_of
+from autopoly_env.refit.tuning_kernels import tune as tune_in_place
 from autopoly_env.silhouette import Target
-from autopoly_env.tuning_kernels import Pixels
-from autopoly_env.tuning_kernels import tune as tune_in_place
 
 
 def tune(mesh: PolyMesh, target: Target, bonds: Bonds | None = None) -> PolyMesh:
@@ -27,7 +26,8 @@ def tune(mesh: PolyMesh, target: Target, bonds: Bonds | None = None) -> PolyMesh
         shape_of(mesh.topology),
         images,
         0.5 if bonds is None else bonds.axis,
-        Pixels(target.mask, target.mask_sum, float(target.n_filled), target.weight_sum),
+        pixels_of(target),
+        float(target.n_filled),
         workspace(target.resolution, len(edges)),
     )
     return mesh.with_vertices(points)

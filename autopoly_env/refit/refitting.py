@@ -17,13 +17,14 @@ from functools import lru_cache
 
 import numpy as np
 
-from autopoly_env import refit_kernels
 from autopoly_env.arrays import BoolArray, IntArray
 from autopoly_env.compute import map_threads
 from autopoly_env.errors import MeshError
 from autopoly_env.mesh import PolyMesh, Topology
-from autopoly_env.raster import workspace
-from autopoly_env.refit_kernels import Picture, Settings, Shape, Ties
+from autopoly_env.raster import picture_of, workspace
+from autopoly_env.raster.raster_kernels import Picture
+from autopoly_env.refit import refit_kernels
+from autopoly_env.refit.shape_kernels import Settings, Shape, Ties
 from autopoly_env.silhouette import Silhouette, Target
 
 
@@ -60,7 +61,7 @@ class RefitTarget:
         """
         sizes = [max(min(8, resolution), resolution // divisor) for divisor in (8, 4, 2, 1)]
         targets = [_with_background(silhouette.target(size), background) for size in sizes]
-        pictures = [Picture(t.coverage, t.row_sum, t.row_square_sum, t.weight_sum) for t in targets]
+        pictures = [picture_of(target) for target in targets]
         return cls((pictures[0], pictures[1], pictures[2], pictures[3]))
 
     @property

@@ -1,0 +1,31 @@
+"""Inverse shape estimation: vertices moved to match a target, by least squares and by the last fractions of a pixel."""
+
+from autopoly_env.refit.refitting import (
+    DEFAULT,
+    FROM_AFAR,
+    LOCAL,
+    THOROUGH,
+    Bonds,
+    RefitConfig,
+    RefitResult,
+    RefitTarget,
+    holding,
+    refit,
+    refit_many,
+)
+from autopoly_env.refit.tuning import tune
+
+__all__ = [
+    "DEFAULT",
+    "FROM_AFAR",
+    "LOCAL",
+    "THOROUGH",
+    "Bonds",
+    "RefitConfig",
+    "RefitResult",
+    "RefitTarget",
+    "holding",
+    "refit",
+    "refit_many",
+    "tune",
+]

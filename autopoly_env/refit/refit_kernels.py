@@ -1,0 +1,115 @@
+"""The refit as a whole: the near phase up the pyramid, the far phase if it is asked for, the best sane mesh kept.
+
+Letters: see `shape_kernels`.
+"""
+
+import numpy as np
+
+from autopoly_env.arrays import FloatArray
+from autopoly_env.compute import kernel
+from autopoly_env.mesh.geometry_kernels import defects
+from autopoly_env.raster.raster_kernels import Picture, Workspace
+from autopoly_env.refit.far_kernels import far_phase
+from autopoly_env.refit.near_kernels import near_phase
+from autopoly_env.refit.shape_kernels import (
+    HIGH,
+    LOSS,
+    LOW,
+    MOST_CROSSINGS,
+    MOST_FLIPPED,
+    N_EVALUATIONS,
+    Progress,
+    Settings,
+    Shape,
+    loss_at,
+    obey,
+    offer,
+    rebase,
+    take_boundary,
+)
+
+
+@kernel
+def refit(
+    start: FloatArray, shape: Shape, pyramid: tuple[Picture, ...], settings: Settings, work: Workspace,
+    result: FloatArray,
+) -> tuple[float, float, int]:  # fmt: skip
+    """Fit all vertices to the target; write (V, 2) `result`; return (loss before, loss after, evaluations).
+
+    The loss is the sum of squared coverage errors at the last, finest picture of `pyramid`. The result has no larger
+    loss than the start, and no more crossings or flipped faces unless `settings.keep_defects` is true.
+    """
+    n = shape.boundary.shape[0]
+    unknowns, scratch = np.empty((n, 2)), np.empty((n, 2))
+    low, high = 0.0, 1.0
+    for k in range(n):
+        v = shape.boundary[k]
+        for axis in range(2):
+            unknowns[k, axis] = start[v, axis]
+            low, high = min(low, start[v, axis]), max(high, start[v, axis])
+    fine = pyramid[len(pyramid) - 1]
+    crossings, flipped = defects(start, shape.edges, shape.corners, shape.offsets)
+    best = Progress(start, start.copy(), np.empty_like(start), np.zeros(6))
+    best.record[MOST_CROSSINGS] = 1e9 if settings.keep_defects else crossings
+    best.record[MOST_FLIPPED] = 1e9 if settings.keep_defects else flipped
+    best.record[LOW], best.record[HIGH] = low, high
+    loss_before = loss_at(unknowns, shape, fine, work, scratch)
+
+    _descend(unknowns, shape, pyramid, settings.first_level, settings, work, best)
+    if settings.n_far > 0:
+        picture = pyramid[max(0, len(pyramid) - 3)]
+        rebase(shape, picture, work, scratch, best)
+        far_phase(unknowns, shape, picture, settings.n_far, work, best)
+        _descend(unknowns, shape, pyramid, len(pyramid) - 2, settings, work, best)
+    rebase(shape, fine, work, scratch, best)
+    reached = loss_at(unknowns, shape, fine, work, scratch)
+    if reached < 0.98 * best.record[LOSS]:  # the free search ended in a mesh that is not sane
+        take_boundary(best.points, shape, unknowns)
+        near_phase(unknowns, shape, fine, 0.0, True, settings, work, best)
+    if best.record[LOSS] <= loss_before:
+        _restore_idle(shape, fine, work, best)
+    if not best.record[LOSS] < loss_before:
+        result[:] = start
+        return loss_before, loss_before, int(best.record[N_EVALUATIONS])
+    result[:] = best.points
+    return loss_before, best.record[LOSS], int(best.record[N_EVALUATIONS])
+
+
+@kernel
+def _descend(
+    unknowns: FloatArray, shape: Shape, pyramid: tuple[Picture, ...], first_level: int, settings: Settings,
+    work: Workspace, best: Progress,
+) -> None:  # fmt: skip
+    """Near phase from `first_level` of the pyramid to its last, each level less stiff than the one before."""
+    scratch = np.empty_like(unknowns)
+    last = len(pyramid) - 1
+    for level in range(max(0, first_level), last + 1):
+        stiffness = 0.0 if level == last else settings.stiffness * 0.3 ** max(0, level - 1)
+        rebase(shape, pyramid[level], work, scratch, best)
+        near_phase(unknowns, shape, pyramid[level], stiffness, False, settings, work, best)
+
+
+@kernel
+def _restore_idle(shape: Shape, picture: Picture, work: Workspace, best: Progress) -> None:
+    """Put vertices that moved less than a tenth of a pixel back to their start if that costs next to nothing."""
+    start, size = best.start, picture.coverage.shape[0]
+    n = shape.boundary.shape[0]
+    unknowns = np.empty((n, 2))
+    idle = 0
+    for k in range(n):
+        v = shape.boundary[k]
+        move = max(abs(best.points[v, 0] - start[v, 0]), abs(best.points[v, 1] - start[v, 1]))
+        source = start if move * size < 0.1 else best.points
+        idle += move > 0.0 and move * size < 0.1
+        unknowns[k, 0] = source[v, 0]
+        unknowns[k, 1] = source[v, 1]
+    if idle == 0:
+        return
+    obey(shape.ties, shape.boundary, best, unknowns)
+    loss = loss_at(unknowns, shape, picture, work, np.empty((n, 2)))
+    allowed = best.record[LOSS] * 1.001 + 1e-3
+    if loss <= allowed:
+        kept = best.record[LOSS]
+        best.record[LOSS] = np.inf
+        if not offer(unknowns, shape, loss, best):
+            best.record[LOSS] = kept

@@ -1,0 +1,185 @@
+"""What a refit knows of a mesh and its target, as arrays, and how unknowns become a mesh that is kept if it is sane.
+
+The unknowns are the N boundary vertices, numbered along the boundary loops so that the normal matrix is almost
+banded; the other vertices do not show in the picture and follow their neighbours. Letters: V vertices, N boundary
+vertices, B directed boundary edges, E edges, F faces, R pixels a side. Positions are in the unit square.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from autopoly_env.arrays import BoolArray, FloatArray, IntArray
+from autopoly_env.compute import kernel
+from autopoly_env.mesh.geometry_kernels import defects
+from autopoly_env.raster.derivative_kernels import half_gradient
+from autopoly_env.raster.raster_kernels import Picture, Workspace
+
+
+class Ties(NamedTuple):
+    """What keeps unknowns from moving freely."""
+
+    leader: IntArray  # (N,) the unknown of which this one is the mirror image; itself where it is none, -1 where locked
+    on_axis: BoolArray  # (N,) the unknowns that stay on the axis
+    axis: float  # x of the axis
+
+
+class Shape(NamedTuple):
+    """What the refit needs of a topology, as arrays."""
+
+    boundary: IntArray  # (N,) vertex of each unknown
+    loops: IntArray  # (B, 2) directed boundary edges between unknowns
+    edges: IntArray  # (E, 2) between vertices
+    corners: IntArray  # (H,) vertices of all faces, one face after the other
+    offsets: IntArray  # (F+1,) where each face starts in `corners`
+    inner: IntArray  # (K,) vertices that are not on the boundary
+    neighbours: IntArray  # vertices joined to each inner vertex, one after the other
+    neighbour_offsets: IntArray  # (K+1,)
+    ties: Ties | None = None  # None where all unknowns are free: Numba then compiles a refit that knows of no ties
+
+
+class Settings(NamedTuple):
+    """The dials of a refit; `autopoly_env.refit.RefitConfig` says what they mean."""
+
+    first_level: int
+    n_near: int
+    n_far: int
+    stiffness: float
+    damping: float
+    tolerance: float
+    keep_defects: bool
+
+
+class Progress(NamedTuple):
+    """Where a refit stands: what it began with and the best sane mesh found so far, in arrays that kernels write to."""
+
+    start: FloatArray  # (V, 2)
+    points: FloatArray  # (V, 2) of the best
+    trial: FloatArray  # (V, 2) scratch
+    record: (
+        FloatArray  # (6,) LOSS at the current level, MOST_CROSSINGS and MOST_FLIPPED faces, N_EVALUATIONS, LOW, HIGH
+    )
+
+
+LOSS, MOST_CROSSINGS, MOST_FLIPPED, N_EVALUATIONS = 0, 1, 2, 3
+LOW, HIGH = 4, 5  # of the box that positions stay in
+
+
+@kernel
+def obey(ties: Ties | None, boundary: IntArray, best: Progress, unknowns: FloatArray) -> None:
+    """Put the unknowns that are tied where their ties want them: locked ones at their start, images opposite."""
+    if ties is None:
+        return
+    start = best.start
+    low, high = best.record[LOW], best.record[HIGH]
+    left, right = max(low, 2.0 * ties.axis - high), min(high, 2.0 * ties.axis - low)  # so that images stay inside
+    for n in range(unknowns.shape[0]):
+        leader = ties.leader[n]
+        if leader < 0:
+            unknowns[n, 0], unknowns[n, 1] = start[boundary[n], 0], start[boundary[n], 1]
+        elif ties.on_axis[n]:
+            unknowns[n, 0] = ties.axis
+        elif leader != n:
+            unknowns[leader, 0] = min(max(unknowns[leader, 0], left), right)
+            unknowns[n, 0] = 2.0 * ties.axis - unknowns[leader, 0]
+            unknowns[n, 1] = unknowns[leader, 1]
+
+
+@kernel
+def tie_gradient(ties: Ties | None, gradient: FloatArray) -> None:
+    """Turn a gradient (N, 2) of free unknowns into that of the leading ones, 0 for those that do not lead."""
+    if ties is None:
+        return
+    for n in range(gradient.shape[0]):
+        leader = ties.leader[n]
+        if leader >= 0 and leader != n:
+            gradient[leader, 0] -= gradient[n, 0]
+            gradient[leader, 1] += gradient[n, 1]
+        if ties.on_axis[n]:
+            gradient[n, 0] = 0.0
+        if leader != n:
+            gradient[n, 0] = 0.0
+            gradient[n, 1] = 0.0
+
+
+@kernel
+def tie_normal(ties: Ties | None, normal: FloatArray) -> None:
+    """The same for the lower triangle of J'J (2N, 2N): rows and columns of images are added to those of their leaders,
+    and all that do not lead become those of the unit matrix."""
+    if ties is None:
+        return
+    size = normal.shape[0]
+    for i in range(size):
+        for j in range(i):
+            normal[j, i] = normal[i, j]
+    for k in range(size):
+        n, axis = k >> 1, k & 1
+        leader = ties.leader[n]
+        if leader == n and not (axis == 0 and ties.on_axis[n]):
+            continue
+        if leader >= 0 and leader != n:
+            sign = -1.0 if axis == 0 else 1.0
+            normal[2 * leader + axis, :] += sign * normal[k, :]
+            normal[:, 2 * leader + axis] += sign * normal[:, k]
+        normal[k, :] = 0.0
+        normal[:, k] = 0.0
+        normal[k, k] = 1.0
+
+
+@kernel
+def spread(unknowns: FloatArray, shape: Shape, best: Progress) -> None:
+    """Write all V positions into `best.trial`: boundary vertices from `unknowns`, inner ones by their neighbours' mean
+    move."""
+    start, points = best.start, best.trial
+    low, high = best.record[LOW], best.record[HIGH]
+    points[:] = start
+    for n in range(shape.boundary.shape[0]):
+        points[shape.boundary[n], 0] = unknowns[n, 0]
+        points[shape.boundary[n], 1] = unknowns[n, 1]
+    if shape.inner.shape[0] == 0:
+        return
+    for _sweep in range(30):
+        for k in range(shape.inner.shape[0]):
+            v = shape.inner[k]
+            first, last = shape.neighbour_offsets[k], shape.neighbour_offsets[k + 1]
+            for axis in range(2):
+                move = 0.0
+                for m in range(first, last):
+                    u = shape.neighbours[m]
+                    move += points[u, axis] - start[u, axis]
+                points[v, axis] = min(max(start[v, axis] + move / (last - first), low), high)
+
+
+@kernel
+def offer(unknowns: FloatArray, shape: Shape, loss: float, best: Progress) -> bool:
+    """Keep the mesh if it is sane and its loss is the least so far; say whether it is sane."""
+    spread(unknowns, shape, best)
+    crossings, flipped = defects(best.trial, shape.edges, shape.corners, shape.offsets)
+    sane = crossings <= best.record[MOST_CROSSINGS] and flipped <= best.record[MOST_FLIPPED]
+    if sane and loss < best.record[LOSS]:
+        best.record[LOSS] = loss
+        best.points[:] = best.trial
+    return sane
+
+
+@kernel
+def loss_at(unknowns: FloatArray, shape: Shape, picture: Picture, work: Workspace, gradient: FloatArray) -> float:
+    """Sum of squared coverage errors; half its gradient per pixel goes into `gradient` (N, 2)."""
+    loss = half_gradient(unknowns, shape.loops, picture, work, gradient)
+    tie_gradient(shape.ties, gradient)
+    return loss
+
+
+@kernel
+def take_boundary(points: FloatArray, shape: Shape, unknowns: FloatArray) -> None:
+    for k in range(shape.boundary.shape[0]):
+        unknowns[k, 0] = points[shape.boundary[k], 0]
+        unknowns[k, 1] = points[shape.boundary[k], 1]
+
+
+@kernel
+def rebase(shape: Shape, picture: Picture, work: Workspace, scratch: FloatArray, best: Progress) -> None:
+    """Restate the loss of the best mesh so far at another level."""
+    unknowns = np.empty((shape.boundary.shape[0], 2))
+    take_boundary(best.points, shape, unknowns)
+    best.record[LOSS] = loss_at(unknowns, shape, picture, work, scratch)
