@@ -8,11 +8,11 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopoly_env import placement_kernels
 from autopoly_env.arrays import FloatArray
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.mesh.geometry_kernels import UNCERTAIN, count_crossings, face_areas, orientation
-from autopoly_env.placement_kernels import blame_edges, measure_regions, regions_of
+from autopoly_env.placement import blame_kernels as placement_kernels
+from autopoly_env.placement.blame_kernels import blame_edges, measure_regions, regions_of
 from tests.shapes import loop, pairs_that_meet, star
 from tests.strategies import meshes, random_walk
 

@@ -23,7 +23,7 @@ from autopoly_env.importance import weighted
 from autopoly_env.mesh import PolyMesh, defects_of, is_valid
 from autopoly_env.operators import STOP, Action, legal_actions
 from autopoly_env.placement import Disagreement
-from autopoly_env.placement_kernels import MASS, MEAN_X
+from autopoly_env.placement.blame_kernels import MASS, MEAN_X
 from autopoly_env.raster import coverage, derivative_kernels, loss_and_gradient, loss_and_gradient_many
 from autopoly_env.raster import rasteriser as raster
 from autopoly_env.refit import FROM_AFAR, Bonds, RefitTarget, refit, shape_kernels

@@ -8,12 +8,12 @@ import skimage.measure
 from hypothesis import given
 from hypothesis import strategies as st
 
-from autopoly_env import placement_kernels
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import IllegalActionError
 from autopoly_env.mesh import PolyMesh, defects_of
 from autopoly_env.operators import OPERATORS, Action, HoleChoice, legal_actions, n_elements
 from autopoly_env.placement import Disagreement, leaves_outline_alone, starts
+from autopoly_env.placement import blame_kernels as placement_kernels
 from autopoly_env.raster import coverage
 from tests.drawings import FRAME, SQUARE, noise, painted
 from tests.shapes import polygon

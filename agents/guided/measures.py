@@ -15,7 +15,7 @@ from autopoly_env.arrays import FloatArray
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import HOLE_SIDES, OPERATORS, Action
 from autopoly_env.placement import Disagreement
-from autopoly_env.placement_kernels import AREA, DEPTH, MASS
+from autopoly_env.placement.blame_kernels import AREA, DEPTH, MASS
 
 N_MEASURES = 9
 _ALONG = (np.arange(N_POINTS) + 0.5)[:, None] / N_POINTS

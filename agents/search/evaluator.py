@@ -8,7 +8,7 @@ import numpy as np
 from autopoly_env.arrays import FloatArray
 from autopoly_env.operators import HOLE_SIDES, Action
 from autopoly_env.placement import Disagreement
-from autopoly_env.placement_kernels import AREA, MASS
+from autopoly_env.placement.blame_kernels import AREA, MASS
 from autopoly_env.simulator import Simulator, State
 
 

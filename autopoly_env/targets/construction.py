@@ -13,7 +13,7 @@ import numpy as np
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import HoleChoice, preset
-from autopoly_env.placement_kernels import regions_of
+from autopoly_env.placement.blame_kernels import regions_of
 from autopoly_env.raster import coverage
 from autopoly_env.score import ScoreWeights, score
 from autopoly_env.sequence import ConstructionSequence

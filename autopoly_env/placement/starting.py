@@ -11,12 +11,12 @@ from functools import cached_property
 import numpy as np
 import shapely
 
-from autopoly_env import placement_kernels
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import IllegalActionError
 from autopoly_env.mesh import PolyMesh, defects_of
 from autopoly_env.operators import HOLE_SIDES, OPERATORS, Action, Choice, HoleChoice, n_elements, plan_hole
-from autopoly_env.placement_kernels import (
+from autopoly_env.placement import blame_kernels as placement_kernels
+from autopoly_env.placement.blame_kernels import (
     AREA,
     COV_XY,
     DEEP_X,
