@@ -92,8 +92,8 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _simulator(source: Path, sequence: "ConstructionSequence", silhouette: "Silhouette") -> "Simulator":
     """The rules that the sequence was made under, as far as it tells them. Raises SequenceError for unknown ones."""
+    from autopoly_env.sequence.variation import weights_of
     from autopoly_env.simulator import Simulator
-    from autopoly_env.variation import weights_of
 
     operators, resolution = sequence.settings.get("operators", "full"), sequence.settings.get("resolution", 128)
     try:

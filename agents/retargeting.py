@@ -17,14 +17,14 @@ from agents.versions import Version, first_settled, neighbours, total_of, versio
 from autopoly_env.arrays import FloatArray
 from autopoly_env.compute import map_threads
 from autopoly_env.errors import AutoPolyError, SequenceError
-from autopoly_env.follower import Follower, Taken
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.raster import coverage
 from autopoly_env.refit import FROM_AFAR, LOCAL, THOROUGH, RefitConfig, refit
 from autopoly_env.score import Score
 from autopoly_env.sequence import ConstructionSequence
+from autopoly_env.sequence.follower import Follower, Taken
+from autopoly_env.sequence.variation import mirrored, stay
 from autopoly_env.simulator import Simulator
-from autopoly_env.variation import mirrored, stay
 
 _N_TRIED = 10  # neighbours that are refitted, those that are best as they are
 _N_THOROUGH = 3  # constructions that are refitted again, harder, before the climb ends

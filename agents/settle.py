@@ -12,11 +12,11 @@ from itertools import pairwise
 import numpy as np
 
 from autopoly_env.errors import IllegalActionError
-from autopoly_env.lesson import LEAST_MOVE
 from autopoly_env.mesh import PolyMesh, is_sane
 from autopoly_env.operators import OPERATORS, Action, Choice
 from autopoly_env.sequence import ConstructionSequence
-from autopoly_env.sequence_ids import decoded
+from autopoly_env.sequence.ids import decoded
+from autopoly_env.sequence.lesson import LEAST_MOVE
 from autopoly_env.simulator import Simulator
 
 _MOST_ROUNDS = 4

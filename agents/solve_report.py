@@ -12,7 +12,7 @@ from rich.text import Text
 
 from agents import base
 from agents.solve_files import Result
-from autopoly_env.lesson import Lesson
+from autopoly_env.sequence import Lesson
 
 COLUMNS = ("r_sm", "r_sc", "r_si", "r_all", "actions", "valid", "blocking_in", "moved", "refits", "seconds")
 FORMATS = (".4f", ".0f", ".0f", ".2f", ".0f", ".2f", ".3f", ".3f", ".0f", ".2f")

@@ -13,7 +13,7 @@ from autopoly_env.mesh import PolyMesh, is_sane
 from autopoly_env.operators import OPERATORS, Action, Choice
 from autopoly_env.score import Score
 from autopoly_env.sequence import ConstructionSequence, Step
-from autopoly_env.sequence_ids import choice_indices, element_index
+from autopoly_env.sequence.ids import choice_indices, element_index
 
 _MOST_LOST = 0.1  # of the IoU of a mesh on the way
 REMOVING = ("vertex_dissolve", "edge_dissolve", "face_delete")

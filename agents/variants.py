@@ -7,12 +7,12 @@ from functools import partial
 import numpy as np
 
 from autopoly_env.arrays import FloatArray
-from autopoly_env.deformation import ThinPlate
 from autopoly_env.errors import AutoPolyError, SequenceError
-from autopoly_env.follower import Place
 from autopoly_env.mesh import PolyMesh, is_sane
 from autopoly_env.sequence import ConstructionSequence
-from autopoly_env.variation import moved_by
+from autopoly_env.sequence.deformation import ThinPlate
+from autopoly_env.sequence.follower import Place
+from autopoly_env.sequence.variation import moved_by
 
 N_TRIES = 50  # draws for a variant before it is given up
 EARLY = 0.35  # share of the steps, from the start, that are edited

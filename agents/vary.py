@@ -112,7 +112,7 @@ def _write(variant: "Variant", folder: Path, ctrl_c: "CtrlC") -> None:
     from agents.base import Solution, Stats
     from agents.solve_files import write_results
     from autopoly_env.score import Score
-    from autopoly_env.variation import picture_of
+    from autopoly_env.sequence.variation import picture_of
 
     sequence, mesh = variant.sequence, variant.sequence.final()
     told = sequence.steps[-1].score if sequence.steps else sequence.start_score

@@ -6,16 +6,16 @@ from functools import cached_property
 
 import numpy as np
 
-from autopoly_env.deformation import ThinPlate
 from autopoly_env.errors import AutoPolyError
-from autopoly_env.follower import Follower, Taken, moved_to
 from autopoly_env.mesh import PolyMesh, is_sane
 from autopoly_env.operators import HOLE_SIDES, OPERATORS, Action
 from autopoly_env.placement import Disagreement, starts
 from autopoly_env.score import Score
 from autopoly_env.sequence import ConstructionSequence
+from autopoly_env.sequence.deformation import ThinPlate
+from autopoly_env.sequence.follower import Follower, Taken, moved_to
+from autopoly_env.sequence.variation import stay
 from autopoly_env.simulator import Simulator, State
-from autopoly_env.variation import stay
 
 _N_BLAMED = 6  # boundary edges that are subdivided and extruded on trial, those with most blame
 _NO_SCORE: dict[str, float] = {"iou": 0.0, "complexity": 0, "self_intersections": 0, "total": 0.0}

@@ -17,7 +17,6 @@ from autopoly_env.compute import Job, Routine, map_threads, run
 from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.guidance import Guidance, importance_settings
 from autopoly_env.importance import ImportanceSource, weighted
-from autopoly_env.lesson import share_moved
 from autopoly_env.mesh import PolyMesh, defects_of
 from autopoly_env.mirror import Beginning, Halfway, mirrored_starts
 from autopoly_env.operators import STOP, Action, Choice, legal_actions, preset
@@ -25,6 +24,7 @@ from autopoly_env.placement import Disagreement, leaves_outline_alone, starts
 from autopoly_env.refit import FROM_AFAR, LOCAL, THOROUGH, RefitConfig, RefitTarget, holding, refit, tune
 from autopoly_env.score import Score, ScoreWeights, score
 from autopoly_env.sequence import ConstructionSequence
+from autopoly_env.sequence.lesson import share_moved
 from autopoly_env.silhouette import Silhouette
 
 POLISH_RESOLUTION = 512  # of the finest refit; a score may be finer

@@ -6,7 +6,7 @@ from typing import Any
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import OPERATORS, Action
 from autopoly_env.sequence import ConstructionSequence
-from autopoly_env.sequence_ids import element_index
+from autopoly_env.sequence.ids import element_index
 
 TOTALS = (60.0, 70.0, 69.0, 72.0, 80.0, 80.5, 81.5, 75.25)  # of the start and of each step
 BEST = 6

@@ -10,11 +10,11 @@ from agents.registry import make_agent
 from agents.settle import settle
 from autopoly_env.conformance import check_simulator
 from autopoly_env.errors import ConfigError
-from autopoly_env.lesson import Lesson, moves, share_moved
 from autopoly_env.mesh import PolyMesh, is_sane
 from autopoly_env.operators import OPERATORS, Action
 from autopoly_env.score import ScoreWeights
-from autopoly_env.sequence import ConstructionSequence
+from autopoly_env.sequence import ConstructionSequence, Lesson
+from autopoly_env.sequence.lesson import moves, share_moved
 from autopoly_env.simulator import Simulator
 from tests.constructions import house
 from tests.drawings import BOTTLE, FRAME, HOUSE, noise, painted

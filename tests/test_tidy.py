@@ -15,7 +15,7 @@ from autopoly_env.mesh import PolyMesh, is_sane
 from autopoly_env.operators import OPERATORS, Action
 from autopoly_env.score import Score
 from autopoly_env.sequence import ConstructionSequence
-from autopoly_env.sequence_ids import element_index
+from autopoly_env.sequence.ids import element_index
 from autopoly_env.simulator import Simulator, State
 from tests.drawings import HOUSE, SQUARE, noise, painted
 from tests.sequences import SCORE, gabled, played, walked

@@ -17,12 +17,11 @@ from PIL import Image
 
 from agents.variants import draw_variants
 from agents.vary import main
-from autopoly_env.deformation import ThinPlate
 from autopoly_env.errors import SequenceError
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.sequence import ConstructionSequence
-from autopoly_env.sequence_file import Step
-from autopoly_env.variation import mirrored
+from autopoly_env.sequence import ConstructionSequence, Step
+from autopoly_env.sequence.deformation import ThinPlate
+from autopoly_env.sequence.variation import mirrored
 from tests.commands import Run, runner
 from tests.constructions import house
 from tests.sequences import gabled, walked

@@ -22,7 +22,7 @@ from autopoly_env.mesh import PolyMesh, is_sane
 from autopoly_env.operators import OPERATORS, Action
 from autopoly_env.score import Score, ScoreWeights
 from autopoly_env.sequence import ConstructionSequence
-from autopoly_env.sequence_ids import element_index
+from autopoly_env.sequence.ids import element_index
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator, State
 from autopoly_env.targets import ConstructionTargets, ObjectTargets

@@ -61,7 +61,7 @@ class Outcome:
     stopped_by: str  # as in `agents.base.Stats`
     curve: list[tuple[int, float, float]]  # refits, seconds, best r_all so far, at the resolution of the search
     mesh: MeshData
-    valid: float | None = None  # these three as in `autopoly_env.lesson.Lesson`; older records have none
+    valid: float | None = None  # these three as in `autopoly_env.sequence.Lesson`; older records have none
     blocking_in: float | None = None
     moved: float | None = None
 

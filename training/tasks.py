@@ -11,10 +11,9 @@ from PIL import Image
 
 from agents.base import Budget, Progress
 from autopoly_env.errors import AutoPolyError
-from autopoly_env.lesson import Lesson
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.score import Score
-from autopoly_env.sequence import ConstructionSequence
+from autopoly_env.sequence import ConstructionSequence, Lesson
 from autopoly_env.silhouette import Silhouette
 from training.parallel import one_line
 from training.records import TARGET_SIZE, MeshData, Outcome, Record

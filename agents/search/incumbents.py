@@ -6,7 +6,7 @@ from dataclasses import replace
 from agents.base import Agent, Meter, Progress, Solution, Track
 from autopoly_env.operators import Action
 from autopoly_env.sequence import ConstructionSequence
-from autopoly_env.sequence_ids import decoded
+from autopoly_env.sequence.ids import decoded
 from autopoly_env.simulator import Simulator
 
 SHARE = 0.6  # of what is left of the budget, that an incumbent may use

@@ -11,9 +11,9 @@ from autopoly_env.export.solid import check_depth
 from autopoly_env.files import write_atomically
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import HOLE_SIDES, OPERATORS, Operator
-from autopoly_env.sequence import ConstructionSequence
-from autopoly_env.sequence_file import Step, parse_hole
-from autopoly_env.sequence_ids import element_index
+from autopoly_env.sequence import ConstructionSequence, Step
+from autopoly_env.sequence.file import parse_hole
+from autopoly_env.sequence.ids import element_index
 
 TEMPLATE = Path(__file__).with_name("blender_template.py")  # a whole script; its construction is replaced
 BEGIN, END = "# --- the construction ---\n", "# --- what a step is in Blender ---\n"

@@ -24,9 +24,9 @@ from autopoly_env.export.replay import finite_meshes, unmoved
 from autopoly_env.export.words import Words, describe_start, describe_step
 from autopoly_env.files import write_atomically
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.sequence import ConstructionSequence
-from autopoly_env.sequence_file import Score, Step
-from autopoly_env.sequence_ids import decoded
+from autopoly_env.sequence import ConstructionSequence, Step
+from autopoly_env.sequence.file import Score
+from autopoly_env.sequence.ids import decoded
 from autopoly_env.silhouette import Silhouette
 
 DIGITS = 5  # of a coordinate: a hundredth of a pixel on a screen

@@ -5,8 +5,8 @@ import numpy as np
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import SequenceError
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.sequence import ConstructionSequence
-from autopoly_env.sequence_file import Step, parse_hole
+from autopoly_env.sequence import ConstructionSequence, Step
+from autopoly_env.sequence.file import parse_hole
 
 NAME_LENGTH = 60  # Blender's names end at 63 bytes
 

@@ -4,8 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.sequence_file import Step
-from autopoly_env.sequence_ids import element_words
+from autopoly_env.sequence import Step
+from autopoly_env.sequence.ids import element_words
 
 EDGES, FACES, VERTICES = "`2`", "`3`", "`1`"  # Blender's select modes
 

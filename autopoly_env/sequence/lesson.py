@@ -10,7 +10,7 @@ import numpy as np
 
 from autopoly_env.arrays import FloatArray
 from autopoly_env.mesh import PolyMesh, is_sane
-from autopoly_env.sequence import ConstructionSequence
+from autopoly_env.sequence.sequence import ConstructionSequence
 
 LEAST_MOVE = 0.01  # of the image's side: a vertex that moves less is said to stay
 

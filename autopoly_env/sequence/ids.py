@@ -5,7 +5,7 @@ from typing import Any
 from autopoly_env.errors import SequenceError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import HOLE_SIDES, OPERATORS, Choice, HoleChoice, Operator
-from autopoly_env.sequence_file import Step, parse_hole, parse_id
+from autopoly_env.sequence.file import Step, parse_hole, parse_id
 
 
 def element_ids(mesh: PolyMesh, kind: str, element: int) -> dict[str, int | list[int]]:

@@ -14,8 +14,8 @@ from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import MeshError, SequenceError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import OPERATORS, Action, Choice
-from autopoly_env.sequence_file import Step
-from autopoly_env.sequence_ids import choice_indices, decoded, element_index
+from autopoly_env.sequence.file import Step
+from autopoly_env.sequence.ids import choice_indices, decoded, element_index
 
 _ALIKE = 0.5  # share of the corners of two faces, of old and new, that they need to have in common to be one
 

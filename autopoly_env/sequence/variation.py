@@ -15,18 +15,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from autopoly_env.arrays import FloatArray
-from autopoly_env.deformation import ThinPlate
 from autopoly_env.errors import AutoPolyError, SequenceError
-from autopoly_env.follower import Follower, Place, Taken, mirror_image, moved_to
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.raster import coverage
 from autopoly_env.score import ScoreWeights, score
-from autopoly_env.sequence_file import Step
-from autopoly_env.sequence_ids import element_words
+from autopoly_env.sequence.deformation import ThinPlate
+from autopoly_env.sequence.file import Step
+from autopoly_env.sequence.follower import Follower, Place, Taken, mirror_image, moved_to
+from autopoly_env.sequence.ids import element_words
 from autopoly_env.silhouette import Silhouette
 
 if TYPE_CHECKING:
-    from autopoly_env.sequence import ConstructionSequence
+    from autopoly_env.sequence.sequence import ConstructionSequence
 
 RESOLUTION = 256  # of the picture of the last mesh
 
@@ -114,7 +114,7 @@ def mirrored(sequence: "ConstructionSequence") -> "ConstructionSequence":
 
 def record(settings: Mapping[str, Any], start: PolyMesh, taken: Sequence[Taken]) -> "ConstructionSequence":
     """The sequence of what was taken, scored against the picture of its last mesh."""
-    from autopoly_env.sequence import ConstructionSequence
+    from autopoly_env.sequence.sequence import ConstructionSequence
 
     meshes = [start, *(mesh for _, _, mesh in taken)]
     target = picture_of(meshes[-1], str(settings.get("target", "shape"))).target(RESOLUTION)

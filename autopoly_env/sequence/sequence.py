@@ -13,8 +13,8 @@ import numpy as np
 from autopoly_env.errors import AutoPolyError, OutputError, SequenceError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import STOP, Action, Choice
-from autopoly_env.sequence_file import Score, Step, check_score, dump_json, parse_json, plain_json
-from autopoly_env.sequence_ids import choice_ids, decoded, element_ids, element_words, operator_named
+from autopoly_env.sequence.file import Score, Step, check_score, dump_json, parse_json, plain_json
+from autopoly_env.sequence.ids import choice_ids, decoded, element_ids, element_words, operator_named
 
 __all__ = ["ConstructionSequence", "Step"]
 
@@ -96,7 +96,7 @@ class ConstructionSequence:
         own, one or both; `insert` is a step to take after step k; `drop` leaves step k out. Later steps are taken
         again. Raises SequenceError naming the step, this or a later one, that is illegal then.
         """
-        from autopoly_env import variation
+        from autopoly_env.sequence import variation
 
         lowest = 1 if drop or choice is not None else 0
         if not lowest <= k <= len(self.steps):
