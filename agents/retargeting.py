@@ -23,7 +23,7 @@ from autopoly_env.refit import FROM_AFAR, LOCAL, THOROUGH, RefitConfig, refit
 from autopoly_env.score import Score
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence.follower import Follower, Taken
-from autopoly_env.sequence.variation import mirrored, stay
+from autopoly_env.sequence.variation import stay
 from autopoly_env.simulator import Simulator
 
 _N_TRIED = 10  # neighbours that are refitted, those that are best as they are
@@ -129,7 +129,7 @@ def _taken(sequence: ConstructionSequence) -> list[Taken]:
 def _both_ways(sequence: ConstructionSequence) -> Iterator[ConstructionSequence]:
     yield sequence
     try:
-        yield mirrored(sequence)
+        yield sequence.mirrored()
     except AutoPolyError:  # whatever cannot be told the other way round
         return
 

@@ -12,7 +12,6 @@ from autopoly_env.mesh import PolyMesh, is_sane
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence.deformation import ThinPlate
 from autopoly_env.sequence.follower import Place
-from autopoly_env.sequence.variation import moved_by
 
 N_TRIES = 50  # draws for a variant before it is given up
 EARLY = 0.35  # share of the steps, from the start, that are edited
@@ -79,7 +78,7 @@ def _draw(
         if not all(is_sane(mesh.with_vertices(points)) for mesh, points in zip(meshes, moved, strict=True)):
             continue
         try:
-            varied = moved_by(sequence, meshes, partial(_place, k, bend, scale, shift))
+            varied = sequence.moved_by(partial(_place, k, bend, scale, shift))
         except AutoPolyError:  # a later step has no room
             continue
         if all(map(is_sane, varied.meshes())):

@@ -194,8 +194,14 @@ def test_save__then_load_gives_the_same_and_leaves_nothing_else(tmp_path: Path) 
 
 
 def test_save__says_why_it_cannot(tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match=r"cannot write .*No such file or directory"):
-        example().save(tmp_path / "absent" / "house.json")
+    (tmp_path / "file").touch()
+    with pytest.raises(OutputError, match=r"cannot write .*Not a directory"):
+        example().save(tmp_path / "file" / "house.json")
+
+
+def test_save__makes_missing_folders(tmp_path: Path) -> None:
+    example().save(tmp_path / "absent" / "house.json")
+    assert ConstructionSequence.load(tmp_path / "absent" / "house.json") == example()
 
 
 def test_load__names_the_file_and_the_reason(tmp_path: Path) -> None:

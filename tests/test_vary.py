@@ -21,7 +21,6 @@ from autopoly_env.errors import SequenceError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.sequence import ConstructionSequence, Step
 from autopoly_env.sequence.deformation import ThinPlate
-from autopoly_env.sequence.variation import mirrored
 from tests.commands import Run, runner
 from tests.constructions import house
 from tests.sequences import gabled, walked
@@ -180,13 +179,13 @@ def test_edited__is_scored_against_its_own_last_mesh() -> None:
 
 @pytest.mark.parametrize("sequence", [house(), gabled(), walked(3), walked(5)], ids=str)
 def test_mirrored__has_every_mesh_mirrored_and_is_undone_by_itself(sequence: ConstructionSequence) -> None:
-    image = mirrored(sequence)
+    image = sequence.mirrored()
     for mesh, other in zip(sequence.meshes(), image.meshes(), strict=True):
         assert other.counts == mesh.counts
         expected = sorted(map(tuple, (mesh.vertices * (-1.0, 1.0) + (1.0, 0.0)).round(9).tolist()))
         assert sorted(map(tuple, other.vertices.round(9).tolist())) == expected
         assert np.allclose(sorted(other.face_areas()), sorted(mesh.face_areas()))
-    back = mirrored(image).final()
+    back = image.mirrored().final()
     assert np.allclose(sorted(back.vertices.tolist()), sorted(sequence.final().vertices.tolist()))
 
 

@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -10,10 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from autopoly_env.errors import AutoPolyError, OutputError, SequenceError
+from autopoly_env.errors import AutoPolyError, SequenceError
+from autopoly_env.files import write_atomically
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import STOP, Action, Choice
+from autopoly_env.sequence import variation
 from autopoly_env.sequence.file import Score, Step, check_score, dump_json, parse_json, plain_json
+from autopoly_env.sequence.follower import Place
 from autopoly_env.sequence.ids import choice_ids, decoded, element_ids, element_words, operator_named
 
 __all__ = ["ConstructionSequence", "Step"]
@@ -96,16 +99,31 @@ class ConstructionSequence:
         own, one or both; `insert` is a step to take after step k; `drop` leaves step k out. Later steps are taken
         again. Raises SequenceError naming the step, this or a later one, that is illegal then.
         """
-        from autopoly_env.sequence import variation
-
         lowest = 1 if drop or choice is not None else 0
         if not lowest <= k <= len(self.steps):
             raise SequenceError(f"step {k} of a sequence of {len(self.steps)}: give {lowest}..{len(self.steps)}")
         if (moved is not None or choice is not None) + (insert is not None) + drop != 1:
             raise SequenceError("give one edit of a step: moved and choice, or insert, or drop")
+        replayed = self._replayed()
         if insert is not None:
-            return variation.with_insertion(self, k, insert)
-        return variation.without(self, k) if drop else variation.with_changes(self, k, moved or {}, choice)
+            return self.record(*variation.with_insertion(replayed, k, insert))
+        if drop:
+            return self.record(*variation.without(replayed, k))
+        return self.record(*variation.with_changes(replayed, k, moved or {}, choice))
+
+    def moved_by(self, place: Callable[[int], Place]) -> "ConstructionSequence":
+        """The same steps, the points of mesh number i (0 is the start) going where `place(i)` takes them.
+
+        Raises SequenceError naming the step that is illegal then.
+        """
+        return self.record(*variation.moved_by(self._replayed(), place))
+
+    def mirrored(self) -> "ConstructionSequence":
+        """The mirror image at x = 1/2: the same actions on mirrored elements. Raises SequenceError as `moved_by`."""
+        return self.record(*variation.mirrored(self._replayed()))
+
+    def _replayed(self) -> variation.Replayed:
+        return variation.Replayed(self.settings, self._meshes, self.steps)
 
     def best_prefix(self) -> "ConstructionSequence":
         """The steps up to the highest total score; of equals the shortest."""
@@ -149,15 +167,7 @@ class ConstructionSequence:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write `to_json` to a file, whole or not at all. Raises OutputError if it cannot be written."""
-        target = Path(path)
-        part = target.with_name(f"{target.name}.{os.getpid()}.tmp")
-        text = self.to_json()
-        try:
-            part.write_text(text, encoding="utf-8")
-            os.replace(part, target)
-        except OSError as error:
-            part.unlink(missing_ok=True)
-            raise OutputError(f"cannot write {target} ({error.strerror}); give a writable path") from None
+        write_atomically(path, self.to_json())
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> "ConstructionSequence":

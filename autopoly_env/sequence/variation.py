@@ -10,38 +10,51 @@ No target is at hand: the meshes are scored against the picture of the last one,
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import AutoPolyError, SequenceError
 from autopoly_env.mesh import PolyMesh
+from autopoly_env.operators import Action, Choice
 from autopoly_env.raster import coverage
 from autopoly_env.score import ScoreWeights, score
 from autopoly_env.sequence.deformation import ThinPlate
-from autopoly_env.sequence.file import Step
+from autopoly_env.sequence.file import Score, Step
 from autopoly_env.sequence.follower import Follower, Place, Taken, mirror_image, moved_to
 from autopoly_env.sequence.ids import element_words
 from autopoly_env.silhouette import Silhouette
-
-if TYPE_CHECKING:
-    from autopoly_env.sequence.sequence import ConstructionSequence
 
 RESOLUTION = 256  # of the picture of the last mesh
 
 Positions = Mapping[int, tuple[float, float]]  # by vertex id, in the unit square
 
 
-def with_changes(
-    sequence: "ConstructionSequence", k: int, moved: Positions, choice: Mapping[str, Any] | None
-) -> "ConstructionSequence":
-    """The sequence with vertices moved after step k (0: of the start mesh), or with another choice in it.
+class Replayed(NamedTuple):
+    """A construction with all of its meshes: number 0 is the start, number i what step i made."""
+
+    settings: Mapping[str, Any]
+    meshes: Sequence[PolyMesh]
+    steps: tuple[Step, ...]
+
+
+class Recording(NamedTuple):
+    """What `ConstructionSequence.record` makes a sequence of."""
+
+    settings: dict[str, Any]
+    start: PolyMesh
+    start_score: Score
+    transitions: list[tuple[Action, Choice | None, PolyMesh, Score]]
+
+
+def with_changes(old: Replayed, k: int, moved: Positions, choice: Mapping[str, Any] | None) -> Recording:
+    """The construction with vertices moved after step k (0: of the start mesh), or with another choice in it.
 
     Raises SequenceError where a step, this or a later one, is illegal then.
     """
-    meshes = sequence.meshes()
-    edited = meshes[0] if k == 0 else _chosen_anew(meshes[k - 1], meshes[k], sequence.steps[k - 1], k, choice)
+    meshes, steps = old.meshes, old.steps
+    edited = meshes[0] if k == 0 else _chosen_anew(meshes[k - 1], meshes[k], steps[k - 1], k, choice)
     if k == 0 and choice is not None:
         raise SequenceError("the start has no choice to change; give a step, from 1")
     try:
@@ -49,72 +62,65 @@ def with_changes(
     except AutoPolyError as error:
         raise SequenceError(f"step {k}: {error}") from None
     if k > 0 and choice is not None:
-        steps = (*sequence.steps[: k - 1], replace(sequence.steps[k - 1], choice=dict(choice)), *sequence.steps[k:])
-        sequence = replace(sequence, steps=steps)
+        steps = (*steps[: k - 1], replace(steps[k - 1], choice=dict(choice)), *steps[k:])
     bend = ThinPlate.through(meshes[k].vertices, edited.vertices)
-    return moved_by(sequence, [*meshes[:k], edited, *meshes[k + 1 :]], lambda i: bend if i > k else stay)
+    changed = Replayed(old.settings, [*meshes[:k], edited, *meshes[k + 1 :]], steps)
+    return moved_by(changed, lambda i: bend if i > k else stay)
 
 
-def with_insertion(sequence: "ConstructionSequence", k: int, step: Step) -> "ConstructionSequence":
-    """The sequence with one more step after step k (0: first); it names what the mesh there has.
+def with_insertion(old: Replayed, k: int, step: Step) -> Recording:
+    """The construction with one more step after step k (0: first); it names what the mesh there has.
 
     Its `created`, `removed` and `score` are found anew. Raises SequenceError where a step is illegal then.
     """
-    meshes = sequence.meshes()
+    meshes = old.meshes
     follower = Follower(meshes[0], meshes[0])
     taken = []
     for number in range(1, len(meshes) + 1):
         if number == k + 1:
             taken.append(_told(number, step, follower.do, step))
         if number < len(meshes):
-            old = sequence.steps[number - 1]
-            taken.append(_told(number, old, follower.take, old, meshes[number - 1], meshes[number], stay))
-    return record(sequence.settings, meshes[0], taken)
+            later = old.steps[number - 1]
+            taken.append(_told(number, later, follower.take, later, meshes[number - 1], meshes[number], stay))
+    return _rescored(old.settings, meshes[0], taken)
 
 
-def without(sequence: "ConstructionSequence", k: int) -> "ConstructionSequence":
-    """The sequence without step k, from 1. Raises SequenceError where a later step is illegal then."""
-    meshes = sequence.meshes()
+def without(old: Replayed, k: int) -> Recording:
+    """The construction without step k, from 1. Raises SequenceError where a later step is illegal then."""
+    meshes = old.meshes
     follower = Follower(meshes[0], meshes[0])
     taken = [
         _told(number, step, follower.take, step, meshes[number - 1], meshes[number], stay)
-        for number, step in enumerate(sequence.steps, 1)
+        for number, step in enumerate(old.steps, 1)
         if number != k
     ]
-    return record(sequence.settings, meshes[0], taken)
+    return _rescored(old.settings, meshes[0], taken)
 
 
-def moved_by(
-    sequence: "ConstructionSequence", meshes: Sequence[PolyMesh], place: Callable[[int], Place]
-) -> "ConstructionSequence":
-    """The same steps, mesh number i of the old `meshes` (0 is the start) moved by `place(i)`.
-
-    Raises SequenceError naming the step that is illegal then.
-    """
+def moved_by(old: Replayed, place: Callable[[int], Place]) -> Recording:
+    """The same steps, mesh number i moved by `place(i)`. Raises SequenceError naming the step that is illegal then."""
+    meshes = old.meshes
     start = meshes[0].with_vertices(place(0)(meshes[0].vertices))
     follower = Follower(meshes[0], start)
     taken = [
-        _told(i, step, follower.take, step, meshes[i - 1], meshes[i], place(i))
-        for i, step in enumerate(sequence.steps, 1)
+        _told(i, step, follower.take, step, meshes[i - 1], meshes[i], place(i)) for i, step in enumerate(old.steps, 1)
     ]
-    return record(sequence.settings, start, taken)
+    return _rescored(old.settings, start, taken)
 
 
-def mirrored(sequence: "ConstructionSequence") -> "ConstructionSequence":
+def mirrored(old: Replayed) -> Recording:
     """The mirror image at x = 1/2: the same actions on mirrored elements. Raises SequenceError as the others."""
-    meshes = sequence.meshes()
+    meshes = old.meshes
     follower = Follower(meshes[0], mirror_image(meshes[0]), is_mirrored=True)
     start = follower.mesh
     taken = [
-        _told(i, step, follower.take, step, meshes[i - 1], meshes[i], _mirrored)
-        for i, step in enumerate(sequence.steps, 1)
+        _told(i, step, follower.take, step, meshes[i - 1], meshes[i], _mirrored) for i, step in enumerate(old.steps, 1)
     ]
-    return record(sequence.settings, start, taken)
+    return _rescored(old.settings, start, taken)
 
 
-def record(settings: Mapping[str, Any], start: PolyMesh, taken: Sequence[Taken]) -> "ConstructionSequence":
-    """The sequence of what was taken, scored against the picture of its last mesh."""
-    from autopoly_env.sequence.sequence import ConstructionSequence
+def _rescored(settings: Mapping[str, Any], start: PolyMesh, taken: Sequence[Taken]) -> Recording:
+    """What was taken, scored against the picture of its last mesh."""
 
     meshes = [start, *(mesh for _, _, mesh in taken)]
     target = picture_of(meshes[-1], str(settings.get("target", "shape"))).target(RESOLUTION)
@@ -122,7 +128,7 @@ def record(settings: Mapping[str, Any], start: PolyMesh, taken: Sequence[Taken])
     scores = [score(mesh, target, weights).as_dict() for mesh in meshes]
     told = {**settings, "scored_at": RESOLUTION, "scored_against": "its last mesh"}
     transitions = [(*one, number) for one, number in zip(taken, scores[1:], strict=True)]
-    return ConstructionSequence.record(told, start, scores[0], transitions)
+    return Recording(told, start, scores[0], transitions)
 
 
 def picture_of(mesh: PolyMesh, name: str) -> Silhouette:
