@@ -7,7 +7,7 @@ from typing import Any
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import AutoPolyError, ConfigError
 from autopoly_env.export import load_obj
-from autopoly_env.importance import read_importance
+from autopoly_env.guidance import read_importance
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.sequence import ConstructionSequence
 

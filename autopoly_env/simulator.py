@@ -15,10 +15,9 @@ import shapely
 from autopoly_env.arrays import BoolArray
 from autopoly_env.compute import Job, Routine, map_threads, run
 from autopoly_env.errors import ConfigError, IllegalActionError
-from autopoly_env.guidance import Guidance, importance_settings
-from autopoly_env.importance import ImportanceSource, weighted
+from autopoly_env.guidance import Guidance, ImportanceSource, importance_settings, weighted
+from autopoly_env.guidance.mirror import Beginning, Halfway, mirrored_starts
 from autopoly_env.mesh import PolyMesh, defects_of
-from autopoly_env.mirror import Beginning, Halfway, mirrored_starts
 from autopoly_env.operators import STOP, Action, Choice, legal_actions, preset
 from autopoly_env.placement import Disagreement, leaves_outline_alone, starts
 from autopoly_env.refit import FROM_AFAR, LOCAL, THOROUGH, RefitConfig, RefitTarget, holding, refit, tune

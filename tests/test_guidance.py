@@ -19,7 +19,8 @@ from agents.solve import main
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import ConfigError, IllegalActionError, MeshError
 from autopoly_env.export import from_obj, load_obj, to_obj
-from autopoly_env.importance import weighted
+from autopoly_env.guidance import best_axis, weighted
+from autopoly_env.guidance.symmetry import images_of, mirrored
 from autopoly_env.mesh import PolyMesh, defects_of, is_valid
 from autopoly_env.operators import STOP, Action, legal_actions
 from autopoly_env.placement import Disagreement
@@ -31,7 +32,6 @@ from autopoly_env.score import intersection_over_union
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import Silhouette, Target, area_means, load_silhouette
 from autopoly_env.simulator import Simulator, State
-from autopoly_env.symmetry import best_axis, images_of, mirrored
 from docs import draw_guidance
 from tests.drawings import BOTTLE, FRAME, HOUSE, L_SHAPE, TWO_SQUARES, noise, painted
 from tests.shapes import central_differences, frame, hourglass, polygon, shapely_coverage, star

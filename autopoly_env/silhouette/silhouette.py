@@ -82,7 +82,7 @@ class Silhouette:
     It fills the unit square, x right, y down. `notes` has a short sentence for everything that loading did or
     noticed; those that begin with "warning:" deserve to be shown. `picture_shape` (H, W) is what the image had before
     it was padded to a square, (R, R) by default. `weights` (R, R) in 0..1 say where matching matters, None: everywhere
-    alike; `autopoly_env.importance.weighted` reads them from an image.
+    alike; `autopoly_env.guidance.guidance.importance.weighted` reads them from an image.
 
     Raises SilhouetteError for a mask that is not boolean, not square or without any object.
     """

@@ -11,10 +11,10 @@ import numpy as np
 
 from autopoly_env.arrays import FloatArray, IntArray
 from autopoly_env.errors import IllegalActionError
+from autopoly_env.guidance.symmetry import images_of, mirrored
 from autopoly_env.mesh import PolyMesh, defects_of
 from autopoly_env.operators import HOLE_SIDES, OPERATORS, Action, Choice, HoleChoice, describe, plan_hole
 from autopoly_env.placement import Disagreement, Start, leaves_outline_alone, starts
-from autopoly_env.symmetry import images_of, mirrored
 
 _HOLE_SCALES = (1.0, 0.6)  # of a hole on the axis, tried until it fits
 

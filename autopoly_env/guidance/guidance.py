@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from autopoly_env.errors import ConfigError, IllegalActionError, MeshError
+from autopoly_env.guidance.symmetry import best_axis, images_of
 from autopoly_env.mesh import PolyMesh, canonical_hash, defects_of, validate
 from autopoly_env.operators import OPERATORS, Action, describe
 from autopoly_env.refit import Bonds
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import Silhouette
-from autopoly_env.symmetry import best_axis, images_of
 
 _LEAST_ROOM = 1 / 64  # beside an axis, in the unit square
 
