@@ -19,9 +19,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from agents.blender import Job, find_blender, mismatches, run_in_blender
 from autopoly_env.errors import AutoPolyError
-from autopoly_env.export.blender import save_blender_script
+from autopoly_env.export.blender import Job, find_blender, mismatches, run_in_blender, save_blender_script
 from autopoly_env.sequence import ConstructionSequence
 
 MOST_ROWS = 30  # of sequences without a difference; the others are all shown

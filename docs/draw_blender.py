@@ -11,12 +11,11 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from agents.blender import Job, run_in_blender
 from agents.registry import make_agent
 from autopoly_env import viewer
 from autopoly_env.arrays import ByteArray
 from autopoly_env.errors import OutputError
-from autopoly_env.export.blender import save_blender_script
+from autopoly_env.export.blender import Job, run_in_blender, save_blender_script
 from autopoly_env.export.sheet import save_png
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import load_silhouette

@@ -21,9 +21,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from agents.blender import Job, find_blender, mismatches, run_in_blender
 from autopoly_env.errors import ConfigError, OutputError, SequenceError
-from autopoly_env.export.blender import END, TEMPLATE, blender_script, save_blender_script
+from autopoly_env.export.blender import Job, find_blender, mismatches, run_in_blender
+from autopoly_env.export.blender.script import END, TEMPLATE, blender_script, save_blender_script
 from autopoly_env.export.gltf import save_gltf
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import OPERATORS

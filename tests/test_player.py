@@ -17,7 +17,7 @@ from PIL import Image
 from autopoly_env import viewer
 from autopoly_env.errors import OutputError, SequenceError
 from autopoly_env.export import save_html, to_html
-from autopoly_env.export.words import describe_start, describe_step
+from autopoly_env.export.player import describe_start, describe_step
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import OPERATORS, Action
 from autopoly_env.sequence import ConstructionSequence

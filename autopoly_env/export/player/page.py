@@ -20,8 +20,8 @@ import numpy as np
 
 from autopoly_env.arrays import FloatArray
 from autopoly_env.export.pictures import picture_url
+from autopoly_env.export.player.words import Words, describe_start, describe_step
 from autopoly_env.export.replay import finite_meshes, unmoved
-from autopoly_env.export.words import Words, describe_start, describe_step
 from autopoly_env.files import write_atomically
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.sequence import ConstructionSequence, Step
@@ -72,7 +72,7 @@ def to_frame(sequence: ConstructionSequence, height: int = 620) -> str:
 
 @cache
 def _part(name: str) -> str:
-    return (files("autopoly_env.export") / "player" / name).read_text(encoding="utf-8")
+    return (files(__package__) / name).read_text(encoding="utf-8")
 
 
 def _digest(text: str) -> str:

@@ -16,7 +16,7 @@ from autopoly_env.errors import ConfigError, OutputError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.sequence import ConstructionSequence
 
-DRIVER = Path(__file__).with_name("blender_driver.py")
+DRIVER = Path(__file__).with_name("driver.py")
 TOLERANCE = 1e-5  # of a coordinate, unit square; Blender's floats have 24 bits
 VARIABLE = "BLENDER"  # of the environment: the path of the program
 

@@ -15,7 +15,7 @@ from autopoly_env.sequence import ConstructionSequence, Step
 from autopoly_env.sequence.file import parse_hole
 from autopoly_env.sequence.ids import element_index
 
-TEMPLATE = Path(__file__).with_name("blender_template.py")  # a whole script; its construction is replaced
+TEMPLATE = Path(__file__).with_name("template.py")  # a whole script; its construction is replaced
 BEGIN, END = "# --- the construction ---\n", "# --- what a step is in Blender ---\n"
 DIGITS = 7  # behind the point; Blender's own floats have about as many
 WIDTH = 100  # columns
