@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from agents.command import FAILURE, complain, run_command
+from agents.commands.running import FAILURE, complain, run_command
 from autopoly_env.errors import ConfigError, OutputError, SequenceError
 
 if TYPE_CHECKING:

@@ -5,15 +5,15 @@ from functools import partial
 from typing import Any
 
 from agents.base import Agent
-from agents.beam import BeamAgent, BeamConfig
+from agents.baselines.beam import BeamAgent, BeamConfig
+from agents.baselines.fixed_topology import DrComplexConfig, DrSimpleConfig, dr_complex, dr_simple
+from agents.baselines.oracle import OracleAgent, OracleConfig
+from agents.baselines.random_agent import RandomAgent, RandomConfig
 from agents.climb.agent import ClimbAgent, ClimbConfig
-from agents.decimate import DecimateAgent, DecimateConfig
-from agents.fixed_topology import DrComplexConfig, DrSimpleConfig, dr_complex, dr_simple
+from agents.climb.decimate import DecimateAgent, DecimateConfig
 from agents.guided.agent import nfap_mcts, nfap_prior
 from agents.guided.config import NfapMctsConfig, NfapPriorConfig
 from agents.options import validated
-from agents.oracle import OracleAgent, OracleConfig
-from agents.random_agent import RandomAgent, RandomConfig
 from agents.rl.agent import PRIOR, rl_agent, rl_prior
 from agents.rl.config import RlConfig, RlPriorConfig
 from agents.search.config import PAPER, MctsConfig

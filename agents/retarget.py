@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from agents.command import INTERRUPTED, run_command
+from agents.commands.running import INTERRUPTED, run_command
 from autopoly_env.errors import ConfigError, SequenceError
 
 if TYPE_CHECKING:
-    from agents.retargeting import Retargeted
+    from agents.retell.retargeting import Retargeted
     from autopoly_env.sequence import ConstructionSequence
     from autopoly_env.silhouette import Silhouette
     from autopoly_env.simulator import Simulator
@@ -51,11 +51,12 @@ def retarget(
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar, no notes.")] = False,
 ) -> int:
     """Read both, retarget, write the results; return the exit code."""
-    from agents.base import Budget
-    from agents.retargeting import retarget as work
-    from agents.solve_files import Result, claim_folder, write_results
-    from agents.solve_report import Report
-    from agents.solve_run import CtrlC, name_jobs
+    from agents.budget import Budget
+    from agents.commands.ctrl_c import CtrlC
+    from agents.commands.report import Report
+    from agents.commands.results import Result, claim_folder, write_results
+    from agents.commands.solving import name_jobs
+    from agents.retell.retargeting import retarget as work
     from autopoly_env.sequence import ConstructionSequence
     from autopoly_env.silhouette import load_silhouette
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from agents.command import FAILURE, complain, run_command
+from agents.commands.running import FAILURE, complain, run_command
 from autopoly_env.errors import AutoPolyError, ConfigError
 
 DEFAULT_AGENT = "mcts"
@@ -107,11 +107,11 @@ def solve(
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar, no notes.")] = False,
 ) -> int:
     """Check everything that can be checked before the work, then do it; return the exit code."""
-    from agents.base import Budget
-    from agents.solve_files import claim_folder
-    from agents.solve_guidance import read_wishes
-    from agents.solve_report import Report
-    from agents.solve_run import Settings, name_jobs, solve_all
+    from agents.budget import Budget
+    from agents.commands.report import Report
+    from agents.commands.results import claim_folder
+    from agents.commands.solving import Settings, name_jobs, solve_all
+    from agents.commands.wishes import read_wishes
     from autopoly_env.score import ScoreWeights
 
     weights = ScoreWeights(w_sm, w_sc, w_si, w_locality)

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from agents.command import INTERRUPTED, run_command
+from agents.commands.running import INTERRUPTED, run_command
 from autopoly_env.errors import ConfigError, SequenceError
 
 if TYPE_CHECKING:
     from rich.progress import Progress
 
-    from agents.solve_run import CtrlC
-    from agents.variants import Variant
+    from agents.commands.ctrl_c import CtrlC
+    from agents.retell.variants import Variant
     from autopoly_env.arrays import ByteArray
     from autopoly_env.mesh import PolyMesh
 
@@ -52,9 +52,9 @@ def vary(
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar, no notes.")] = False,
 ) -> int:
     """Check the options, then draw and write one variant after the other; return the exit code."""
-    from agents.solve_files import claim_folder
-    from agents.solve_run import CtrlC
-    from agents.variants import check_sound, draw_variants
+    from agents.commands.ctrl_c import CtrlC
+    from agents.commands.results import claim_folder
+    from agents.retell.variants import check_sound, draw_variants
     from autopoly_env.sequence import ConstructionSequence
 
     _check(n, amount, seed)
@@ -109,8 +109,8 @@ def _bar(quiet: bool) -> "Progress":
 
 def _write(variant: "Variant", folder: Path, ctrl_c: "CtrlC") -> None:
     """Write what `agents.solve` writes, the variant's own last mesh for its target."""
-    from agents.base import Solution, Stats
-    from agents.solve_files import write_results
+    from agents.commands.results import write_results
+    from agents.solution import Solution, Stats
     from autopoly_env.score import Score
     from autopoly_env.sequence.variation import picture_of
 

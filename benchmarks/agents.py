@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from agents.base import Agent, Budget
+from agents.base import Agent
+from agents.budget import Budget
 from agents.registry import make_agent
 from autopoly_env.score import ScoreWeights
 from autopoly_env.silhouette import load_silhouette

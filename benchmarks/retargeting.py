@@ -17,9 +17,9 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from agents.base import Budget
+from agents.budget import Budget
 from agents.registry import make_agent
-from agents.retargeting import retarget
+from agents.retell.retargeting import retarget
 from autopoly_env.errors import SequenceError
 from autopoly_env.files import write_atomically
 from autopoly_env.silhouette import Silhouette

@@ -15,11 +15,13 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from agents.base import Budget, Meter, Track, finish
-from agents.command import FAILURE, run_command
+from agents.budget import Budget, Meter
+from agents.commands.running import FAILURE, run_command
+from agents.finish import finish
 from agents.registry import make_agent
 from agents.rl.player import Player
 from agents.rl.weights import load_policy, read_policy_meta
+from agents.solution import Track
 from autopoly_env.errors import ConfigError
 from autopoly_env.files import write_atomically
 from autopoly_env.score import ScoreWeights

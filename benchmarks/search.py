@@ -13,7 +13,7 @@ import typer
 from rich.console import Console
 from rich.status import Status
 
-from agents.command import run_command
+from agents.commands.running import run_command
 from autopoly_env.errors import ConfigError, SilhouetteError
 from autopoly_env.files import write_atomically
 from autopoly_env.silhouette import find_images

@@ -9,8 +9,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from agents.base import Budget, Solution
+from agents.budget import Budget
 from agents.registry import make_agent
+from agents.solution import Solution
 from autopoly_env.errors import OutputError
 from autopoly_env.files import write_atomically
 from autopoly_env.score import ScoreWeights

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from agents.base import Budget
+from agents.budget import Budget
 from agents.registry import AGENTS, make_agent
 from agents.search.config import MctsConfig
 from autopoly_env.arrays import FloatArray

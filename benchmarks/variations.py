@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from agents.variants import N_TRIES, draw_variants
+from agents.retell.variants import N_TRIES, draw_variants
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import load_silhouette

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from PIL import Image, ImageDraw
 
-from agents.base import Budget, Solution
+from agents.budget import Budget
 from agents.registry import make_agent
+from agents.solution import Solution
 from autopoly_env.arrays import ByteArray, FloatArray
 from autopoly_env.export.sheet import save_png
 from autopoly_env.mesh import PolyMesh

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from agents.base import Budget
+from agents.budget import Budget
 from agents.registry import make_agent
-from agents.retargeting import retarget
-from agents.variants import draw_variants
+from agents.retell.retargeting import retarget
+from agents.retell.variants import draw_variants
 from autopoly_env.arrays import ByteArray
 from autopoly_env.export.sheet import save_png
 from autopoly_env.sequence import ConstructionSequence

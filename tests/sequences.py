@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from agents.random_agent import RandomAgent, RandomConfig
+from agents.baselines.random_agent import RandomAgent, RandomConfig
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import OPERATORS, Action
 from autopoly_env.sequence import ConstructionSequence

@@ -8,10 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from agents.base import Agent, Budget, Decision, Meter, Progress, Solution, Track, finish
-from agents.beam import BeamAgent, BeamConfig
-from agents.random_agent import RandomAgent, RandomConfig
+from agents.base import Agent, Decision
+from agents.baselines.beam import BeamAgent, BeamConfig
+from agents.baselines.random_agent import RandomAgent, RandomConfig
+from agents.budget import Budget, Meter, Progress
+from agents.finish import finish
 from agents.registry import AGENTS, make_agent
+from agents.solution import Solution, Track
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import OPERATORS, STOP, Action

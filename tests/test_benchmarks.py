@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from agents.base import Budget
+from agents.budget import Budget
 from agents.search.config import PAPER, MctsConfig
 from autopoly_env.errors import OutputError
 from autopoly_env.refit import refit_kernels

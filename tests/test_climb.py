@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 import shapely
 
-from agents.base import Budget, Meter
+from agents.budget import Budget, Meter
 from agents.climb.agent import ClimbConfig, climb
+from agents.climb.coarsened import variants
 from agents.climb.hill import Hill, Place
 from agents.climb.hop import hop
 from agents.climb.moves import neighbours, shaken
 from agents.climb.tops import Tops
-from agents.climb.variants import variants
 from agents.trace.outline import Outline
 from agents.trace.rings import Ring
 from autopoly_env.mesh import PolyMesh

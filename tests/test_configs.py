@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from agents.beam import BeamConfig
+from agents.baselines.beam import BeamConfig
 from agents.configs import load_agent, load_config
 from agents.registry import AGENTS, make_agent
 from autopoly_env.errors import ConfigError

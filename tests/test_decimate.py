@@ -5,9 +5,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from agents.base import Budget, Meter, Progress
+from agents.budget import Budget, Meter, Progress
+from agents.climb.decimate import DecimateAgent, DecimateConfig, _coarser, _spanned, n_vertices
 from agents.climb.hill import Hill
-from agents.decimate import DecimateAgent, DecimateConfig, _coarser, _spanned, n_vertices
 from agents.registry import make_agent
 from agents.trace.outline import Outline
 from agents.trace.reach import Reach

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import shapely
 
-from agents.base import Budget
+from agents.budget import Budget
 from agents.registry import make_agent
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh, defects_of
@@ -153,7 +153,7 @@ def test_gradient__returns_the_best_so_far_on_ctrl_c(torch: Any, monkeypatch: py
 
 
 def test_gradient__says_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delitem(sys.modules, "agents.descent", raising=False)
+    monkeypatch.delitem(sys.modules, "agents.baselines.descent", raising=False)
     monkeypatch.setitem(sys.modules, "torch", None)
     for name in ("dr-simple", "dr-complex"):
         with pytest.raises(ConfigError, match=rf"agent '{name}' .* package torch, .* pip install -e '\.\[learn\]'"):

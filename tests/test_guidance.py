@@ -13,8 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from agents.base import Budget, Meter, Solution, finish
+from agents.budget import Budget, Meter
+from agents.finish import finish
 from agents.registry import AGENTS, make_agent
+from agents.solution import Solution
 from agents.solve import main
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import ConfigError, IllegalActionError, MeshError

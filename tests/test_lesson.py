@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agents.base import Budget
+from agents.budget import Budget
+from agents.finish.settle import settle
 from agents.registry import make_agent
-from agents.settle import settle
 from autopoly_env.conformance import check_simulator
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh, is_sane

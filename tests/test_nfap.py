@@ -13,7 +13,7 @@ import pytest
 import shapely
 import torch
 
-from agents.base import Budget
+from agents.budget import Budget
 from agents.guided.config import CLASSES, NfapConfig, WarpConfig, class_of
 from agents.guided.evaluator import NfapEvaluator, WarpEvaluator
 from agents.guided.measures import N_MEASURES, action_measures, action_spots

@@ -5,9 +5,10 @@ from typing import Any
 
 import pytest
 
-from agents.base import Budget, Meter, Progress, Track
-from agents.oracle import OracleAgent, OracleConfig
+from agents.baselines.oracle import OracleAgent, OracleConfig
+from agents.budget import Budget, Meter, Progress
 from agents.registry import make_agent
+from agents.solution import Track
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import is_sane
 from autopoly_env.operators import STOP

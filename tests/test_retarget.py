@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from agents.base import Budget, Meter, Progress
+from agents.budget import Budget, Meter, Progress
 from agents.retarget import main
-from agents.retargeting import align, retarget
+from agents.retell.retargeting import align, retarget
 from autopoly_env.mesh import PolyMesh, is_sane
 from autopoly_env.operators import OPERATORS, Action
 from autopoly_env.sequence import ConstructionSequence

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from agents.base import Budget
+from agents.budget import Budget
 from agents.registry import AGENTS, make_agent
 from agents.rl.config import NetConfig, Rules
 from agents.rl.network import MeshNet

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from agents.base import Agent, Budget, Decision, Meter, Progress, Solution, Track
+from agents.base import Agent, Decision
+from agents.budget import Budget, Meter, Progress
 from agents.registry import make_agent
 from agents.search.backup import back_up
 from agents.search.config import PAPER, MctsConfig
@@ -18,6 +19,7 @@ from agents.search.search import Search
 from agents.search.selection import best_half, halving_schedule, puct, uct
 from agents.search.simulation import value_of
 from agents.search.tree import Node, ValueRange
+from agents.solution import Solution, Track
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh

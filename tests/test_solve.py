@@ -18,10 +18,10 @@ import shapely
 from PIL import Image
 
 from agents.base import Decision
-from agents.beam import BeamAgent, BeamConfig
+from agents.baselines.beam import BeamAgent, BeamConfig
+from agents.commands.results import RESULTS
 from agents.registry import AGENTS
 from agents.solve import main
-from agents.solve_files import RESULTS
 from autopoly_env.score import ScoreWeights, score
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import load_silhouette
@@ -240,7 +240,7 @@ def test_bad_images__are_reported_one_by_one_and_stop_nothing(run: Run) -> None:
 
 def test_out__that_cannot_be_written_is_found_out_before_the_work(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     small_image("box.png")
-    monkeypatch.setattr("agents.solve_run.load_silhouette", lambda *_, **__: pytest.fail("the work has begun"))
+    monkeypatch.setattr("agents.commands.solving.load_silhouette", lambda *_, **__: pytest.fail("the work has begun"))
     Path("file").write_text("")
     done = run("box.png", "--out", "file/out")
     assert (done.code, done.out, len(done.err.splitlines())) == (1, "", 1)
@@ -257,7 +257,7 @@ def test_failed_write__leaves_nothing_behind(run: Run, monkeypatch: pytest.Monke
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr("agents.solve_files.save_png", full_disk)
+        patch.setattr("agents.commands.results.save_png", full_disk)
         done = run("box.png", "other.png", "--w-sc", "3")
     assert done.code == 1
     for line, name in zip(done.err.splitlines(), ("box", "other"), strict=True):
@@ -348,7 +348,7 @@ def test_ctrl_c_outside_a_search__waits_until_the_image_is_written(run: Run, mon
         press_ctrl_c()
         return Image.new("RGB", (300, 300))
 
-    monkeypatch.setattr("agents.solve_files.contact_sheet", interrupted_sheet)
+    monkeypatch.setattr("agents.commands.results.contact_sheet", interrupted_sheet)
     done = run(small_image("a.png"), small_image("b.png"), small_image("c.png"))
     assert done.code == 130
     assert sorted(os.listdir("out/a")) == sorted(RESULTS)
@@ -362,7 +362,7 @@ def test_ctrl_c_while_an_image_loads__leaves_that_image(run: Run, monkeypatch: p
         press_ctrl_c()
         return load_silhouette(path, name=name)
 
-    monkeypatch.setattr("agents.solve_run.load_silhouette", interrupted_load)
+    monkeypatch.setattr("agents.commands.solving.load_silhouette", interrupted_load)
     done = run(small_image("a.png"), small_image("b.png"))
     assert (done.code, done.out, os.listdir("out")) == (130, "", [])
     assert "stopped by Ctrl-C: 2 of 2 images left" in done.err
@@ -375,7 +375,7 @@ def test_second_ctrl_c__aborts_and_leaves_nothing_half_written(run: Run, monkeyp
         pytest.fail("the second Ctrl-C was not heard")
 
     handler = signal.getsignal(signal.SIGINT)
-    monkeypatch.setattr("agents.solve_files.contact_sheet", impatient_sheet)
+    monkeypatch.setattr("agents.commands.results.contact_sheet", impatient_sheet)
     done = run(small_image("a.png"), small_image("b.png"))
     assert (done.code, done.out, os.listdir("out")) == (130, "", [])
     assert "aborted" in done.err
@@ -388,7 +388,7 @@ def test_second_ctrl_c__waits_while_files_are_moved_into_place(run: Run, monkeyp
         real_replace(source, goal)
 
     real_replace = os.replace
-    monkeypatch.setattr("agents.solve_files.os", SimpleNamespace(replace=impatient_replace))
+    monkeypatch.setattr("agents.commands.results.os", SimpleNamespace(replace=impatient_replace))
     done = run(small_image("a.png"), small_image("b.png"))
     assert done.code == 130
     assert (os.listdir("out"), sorted(os.listdir("out/a"))) == (["a"], sorted(RESULTS))

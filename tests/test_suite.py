@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from agents.base import Budget, Progress
+from agents.budget import Budget, Progress
 from agents.registry import AGENTS
 from autopoly_env.errors import ConfigError
 from autopoly_env.score import ScoreWeights

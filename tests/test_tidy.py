@@ -8,9 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agents.base import Meter, finish
-from agents.pare import pare
-from agents.tidy import tidy
+from agents.budget import Meter
+from agents.finish import finish
+from agents.finish.pare import pare
+from agents.finish.tidy import tidy
 from autopoly_env.mesh import PolyMesh, is_sane
 from autopoly_env.operators import OPERATORS, Action
 from autopoly_env.score import Score

@@ -11,7 +11,7 @@ import skimage.measure
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agents.base import Budget, Meter
+from agents.budget import Budget, Meter
 from agents.trace.agent import TraceAgent, TraceConfig, build_best, choose_sizes
 from agents.trace.construct import UnbuildableError, construct
 from agents.trace.outline import Outline, outline_of_mesh

@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from agents.variants import draw_variants
+from agents.retell.variants import draw_variants
 from agents.vary import main
 from autopoly_env.errors import SequenceError
 from autopoly_env.mesh import PolyMesh

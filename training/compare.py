@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from agents.command import run_command
+from agents.commands.running import run_command
 from autopoly_env.errors import ConfigError
 from autopoly_env.files import write_atomically
 from training.report.comparison import Row, read_runs, rows_of

@@ -14,7 +14,7 @@ from rich.table import Table
 from torch import nn
 from torch.utils.flop_counter import FlopCounterMode
 
-from agents.command import run_command
+from agents.commands.running import run_command
 from agents.guided.config import NfapConfig, WarpConfig
 from agents.guided.layers import n_parameters
 from agents.guided.nfap import NfapNet

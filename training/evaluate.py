@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from agents.command import FAILURE, INTERRUPTED, run_command
+from agents.commands.running import FAILURE, INTERRUPTED, run_command
 from autopoly_env.errors import ConfigError
 
 if TYPE_CHECKING:

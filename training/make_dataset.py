@@ -10,7 +10,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from agents.command import FAILURE, INTERRUPTED, run_command
+from agents.commands.running import FAILURE, INTERRUPTED, run_command
 from autopoly_env.errors import ConfigError
 
 HELP = """Make data sets of targets, check them, draw silhouettes of 3-D models.

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from agents.command import GOES_ON, run_command
+from agents.commands.running import GOES_ON, run_command
 from autopoly_env.errors import ConfigError, RunError
 from autopoly_env.files import write_atomically
 from training.nfap_data import SourceConfig, build_trajectory

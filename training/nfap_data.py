@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from agents.base import Budget
+from agents.budget import Budget
 from agents.registry import make_agent
 from agents.search.evaluator import ResidualEvaluator
 from autopoly_env.errors import ConfigError

@@ -25,7 +25,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 from torch.utils.data import Dataset
 
-from agents.command import GOES_ON, run_command
+from agents.commands.running import GOES_ON, run_command
 from agents.rl.config import NetConfig, Rules
 from agents.rl.network import NEVER, MeshNet, observer_of
 from agents.rl.player import observation_of

@@ -12,7 +12,8 @@ import numpy as np
 import yaml
 from pydantic import ConfigDict, Field
 
-from agents.base import Agent, Budget
+from agents.base import Agent
+from agents.budget import Budget
 from agents.options import read_yaml
 from agents.registry import AGENTS, make_agent
 from autopoly_env.errors import AutoPolyError, ConfigError

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from agents.base import Budget, Progress
+from agents.budget import Budget, Progress
 from autopoly_env.errors import AutoPolyError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.score import Score

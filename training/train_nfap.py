@@ -19,7 +19,7 @@ import torch
 import typer
 from torch import Tensor, nn
 
-from agents.command import GOES_ON, run_command
+from agents.commands.running import GOES_ON, run_command
 from agents.guided.config import NfapConfig
 from agents.guided.nfap import Foresight, NfapLabels, NfapNet, loss_terms
 from training.finish import finish_run

@@ -28,7 +28,7 @@ from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.utils import set_random_seed
 from stable_baselines3.common.vec_env import VecEnv
 
-from agents.command import GOES_ON, run_command
+from agents.commands.running import GOES_ON, run_command
 from agents.rl.algorithms import load_checkpoint, make_model, net_of_zip, read_note, save_checkpoint
 from agents.rl.envs import Course, Table, make_vec_env
 from agents.rl.network import MeshNet

@@ -19,7 +19,7 @@ import torch
 import typer
 from torch import Tensor, nn
 
-from agents.command import GOES_ON, run_command
+from agents.commands.running import GOES_ON, run_command
 from agents.guided.config import WarpConfig
 from agents.guided.warp import Theta, Warp, WarpNet, loss_terms
 from autopoly_env.errors import ConfigError

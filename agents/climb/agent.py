@@ -8,11 +8,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain
 
-from agents.base import Meter, Solution, WholeAgent, finish
-from agents.beam import BeamAgent, BeamConfig
+from agents.base import WholeAgent
+from agents.baselines.beam import BeamAgent, BeamConfig
+from agents.budget import Meter
 from agents.climb.hill import LEAST_GAIN, Hill, Place, total_of
 from agents.climb.moves import neighbours, relocations
 from agents.climb.tops import Tops
+from agents.finish import finish
+from agents.solution import Solution
 from agents.trace.agent import TraceAgent, TraceConfig
 from autopoly_env.refit import LOCAL, THOROUGH
 from autopoly_env.simulator import Simulator

@@ -8,11 +8,11 @@ from itertools import chain
 
 import numpy as np
 
-from agents.base import Meter
+from agents.budget import Meter
 from agents.climb.agent import ClimbConfig, climb, fitted_neighbours
+from agents.climb.coarsened import variants
 from agents.climb.hill import LEAST_GAIN, Hill, Place, total_of
 from agents.climb.moves import shaken
-from agents.climb.variants import variants
 from agents.trace.agent import TraceAgent, TraceConfig
 from agents.trace.rings import trace_rings
 from autopoly_env.refit import LOCAL, THOROUGH

@@ -5,10 +5,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from agents.base import Agent, Decision, Meter, Track
+from agents.base import Agent, Decision
+from agents.budget import Meter
 from agents.extras import require
 from agents.rl.config import RlConfig, RlPriorConfig
 from agents.search.mcts import MctsAgent
+from agents.solution import Track
 from autopoly_env.compute import n_threads
 from autopoly_env.operators import STOP
 from autopoly_env.simulator import Simulator, State

@@ -9,8 +9,9 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import torch
 
-from agents.base import Meter, Track
+from agents.budget import Meter
 from agents.rl.network import NEVER, MeshNet, observer_of
+from agents.solution import Track
 from autopoly_env.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from autopoly_env.errors import IllegalActionError
 from autopoly_env.observation import Observation

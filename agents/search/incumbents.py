@@ -3,7 +3,9 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from agents.base import Agent, Meter, Progress, Solution, Track
+from agents.base import Agent
+from agents.budget import Meter, Progress
+from agents.solution import Solution, Track
 from autopoly_env.operators import Action
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence.ids import decoded

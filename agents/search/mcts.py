@@ -9,15 +9,18 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from agents.base import Agent, Budget, Decision, Meter, Progress, Solution, Track, finish
+from agents.base import Agent, Decision
+from agents.budget import Budget, Meter, Progress
 from agents.climb.hill import Hill
 from agents.climb.hop import hop
 from agents.climb.tops import Tops
+from agents.finish import finish
 from agents.search.config import MctsConfig
 from agents.search.evaluator import Evaluator, ResidualEvaluator, UniformEvaluator
 from agents.search.incumbents import play, track_of
 from agents.search.search import Search
 from agents.search.tree import Node
+from agents.solution import Solution, Track
 from autopoly_env.operators import STOP
 from autopoly_env.simulator import Simulator, State
 

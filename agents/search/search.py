@@ -4,13 +4,14 @@ from collections.abc import Generator, Iterator
 
 import numpy as np
 
-from agents.base import Meter, Track
+from agents.budget import Meter
 from agents.search.backup import back_up
 from agents.search.config import MctsConfig
 from agents.search.evaluator import Evaluator
 from agents.search.selection import FORMULAS, best_half, halving_schedule, select_child
 from agents.search.simulation import roll_out, value_of
 from agents.search.tree import Node, ValueRange
+from agents.solution import Track
 from autopoly_env.mesh import canonical_hash
 from autopoly_env.operators import Action
 from autopoly_env.simulator import Simulator, State

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from agents.base import Track
 from agents.search.evaluator import Evaluator
+from agents.solution import Track
 from autopoly_env.simulator import Simulator
 
 

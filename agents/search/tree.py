@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from agents.base import Track
+from agents.solution import Track
 from autopoly_env.arrays import FloatArray
 from autopoly_env.operators import Action
 

@@ -11,7 +11,10 @@ from itertools import chain, count
 import numpy as np
 import shapely
 
-from agents.base import Meter, Solution, WholeAgent, finish
+from agents.base import WholeAgent
+from agents.budget import Meter
+from agents.finish import finish
+from agents.solution import Solution
 from agents.trace.construct import UnbuildableError, construct
 from agents.trace.outline import Outline, outline_of
 from agents.trace.reach import Reach

@@ -10,8 +10,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn
 from rich.table import Table
 from rich.text import Text
 
-from agents import base
-from agents.solve_files import Result
+from agents import budget
+from agents.commands.results import Result
 from autopoly_env.sequence import Lesson
 
 COLUMNS = ("r_sm", "r_sc", "r_si", "r_all", "actions", "valid", "blocking_in", "moved", "refits", "seconds")
@@ -64,7 +64,7 @@ class Report:
         self._name = name
         self._bar.update(self._task, description=name)
 
-    def progress(self, progress: base.Progress) -> None:
+    def progress(self, progress: budget.Progress) -> None:
         """An agent has come this far with it."""
         text = f"{self._name}  r_all {progress.best_total:.2f}, {progress.n_refits} refits"
         if progress.n_nodes:

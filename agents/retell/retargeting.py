@@ -11,9 +11,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from agents.base import Budget, Meter, Progress, Solution, finish
+from agents.budget import Budget, Meter, Progress
+from agents.finish import finish
+from agents.retell.versions import Version, first_settled, neighbours, total_of, version_of
+from agents.solution import Solution
 from agents.trace.rings import signed_area, trace_rings
-from agents.versions import Version, first_settled, neighbours, total_of, version_of
 from autopoly_env.arrays import FloatArray
 from autopoly_env.compute import map_threads
 from autopoly_env.errors import AutoPolyError, SequenceError

@@ -3,7 +3,9 @@
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from agents.base import Agent, Decision, Meter, Track
+from agents.base import Agent, Decision
+from agents.budget import Meter
+from agents.solution import Track
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import canonical_hash, is_sane
 from autopoly_env.operators import STOP

@@ -9,8 +9,11 @@ from typing import Literal
 
 import numpy as np
 
-from agents.base import Meter, Solution, WholeAgent, finish
+from agents.base import WholeAgent
+from agents.budget import Meter
 from agents.extras import require
+from agents.finish import finish
+from agents.solution import Solution
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.refit import FROM_AFAR, RefitTarget, refit
@@ -75,7 +78,7 @@ class DescentAgent(WholeAgent):
 
     def _find(self, simulator: Simulator, meter: Meter) -> Solution:
         """The best mesh on the way, whatever the budget; Ctrl-C ends the way."""
-        from agents.descent import Descent
+        from agents.baselines.descent import Descent
 
         target = simulator.silhouette.target(simulator.resolution)
         start = _grid_over(simulator, self._n)

@@ -4,8 +4,11 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
-from agents.base import Agent, Budget, Decision, Meter, Progress, Solution, Track, finish
-from agents.beam import BeamAgent, BeamConfig
+from agents.base import Agent, Decision
+from agents.baselines.beam import BeamAgent, BeamConfig
+from agents.budget import Budget, Meter, Progress
+from agents.finish import finish
+from agents.solution import Solution, Track
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import canonical_hash
 from autopoly_env.operators import STOP

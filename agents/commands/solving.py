@@ -1,20 +1,21 @@
 """The work behind `agents.solve`: one image after the other, each whole or not at all, until done or Ctrl-C."""
 
-import signal
 import traceback
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from agents.base import Agent, Budget, check_guidance
+from agents.base import Agent, check_guidance
+from agents.budget import Budget
+from agents.commands.ctrl_c import CtrlC
+from agents.commands.report import Report
+from agents.commands.results import OVERVIEW, RESULTS, Overview, Result, write_results
+from agents.commands.wishes import NO_WISHES, Wishes
 from agents.registry import AGENTS, make_agent
-from agents.solve_files import OVERVIEW, RESULTS, Overview, Result, write_results
-from agents.solve_guidance import NO_WISHES, Wishes
-from agents.solve_report import Report
 from autopoly_env.compute import n_threads
 from autopoly_env.errors import AutoPolyError, ConfigError
 from autopoly_env.export import save_png
@@ -81,48 +82,6 @@ class Job:
     image: Path
     name: str
     notes: tuple[str, ...] = ()  # why it is not the name of the image, if it is not
-
-
-class CtrlC:
-    """The first Ctrl-C ends a search (KeyboardInterrupt in it) and then the run, the second ends everything at once."""
-
-    def __init__(self) -> None:
-        self.n_pressed = 0
-        self._searching = self._shielded = False
-
-    def __enter__(self) -> "CtrlC":
-        self._before = signal.signal(signal.SIGINT, self._on_signal)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        signal.signal(signal.SIGINT, self._before)
-
-    def _on_signal(self, *_: object) -> None:
-        self.n_pressed += 1
-        if not self._shielded and (self._searching or self.n_pressed > 1):
-            raise KeyboardInterrupt
-
-    @contextmanager
-    def searching(self) -> Iterator[None]:
-        """Where the first Ctrl-C is for the agent, which returns its best so far."""
-        self._searching = True
-        try:
-            if self.n_pressed:
-                raise KeyboardInterrupt
-            yield
-        finally:
-            self._searching = False
-
-    @contextmanager
-    def shielded(self) -> Iterator[None]:
-        """Where even a second Ctrl-C has to wait, for the blink of an eye."""
-        self._shielded = True
-        try:
-            yield
-        finally:
-            self._shielded = False
-        if self.n_pressed > 1:
-            raise KeyboardInterrupt
 
 
 def name_jobs(images: Sequence[Path], out: Path) -> list[Job]:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from agents.tidy import REMOVING
+from agents.finish.tidy import REMOVING
 from autopoly_env.errors import IllegalActionError
 from autopoly_env.mesh import is_sane
 from autopoly_env.operators import OPERATORS, STOP, Action

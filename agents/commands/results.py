@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from agents.base import Solution
+from agents.solution import Solution
 from autopoly_env import viewer
 from autopoly_env.arrays import ByteArray
 from autopoly_env.errors import OutputError

@@ -10,9 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from agents.base import Meter, Solution, WholeAgent, finish
+from agents.base import WholeAgent
+from agents.budget import Meter
 from agents.climb.hill import Hill, Place, total_of
 from agents.climb.tops import Tops
+from agents.finish import finish
+from agents.solution import Solution
 from agents.trace.agent import TraceAgent, TraceConfig
 from agents.trace.outline import Outline
 from agents.trace.reach import Reach

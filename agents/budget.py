@@ -1,0 +1,131 @@
+"""How much work a solve may do, and how much it has done."""
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from typing import TypeVar
+
+from agents.solution import Stats
+from autopoly_env.errors import ConfigError
+from autopoly_env.simulator import State
+
+_Start = TypeVar("_Start")
+
+
+@dataclass(frozen=True)
+class Budget:
+    """How much work a solve may do; None is no limit. It is looked at between steps: one may overrun it."""
+
+    refits: int | None = None
+    seconds: float | None = None
+    simulations: int | None = None  # of a tree search, what its seeds do not counted
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if value is not None and not value >= 0:
+                raise ConfigError(f"a budget of {value} {name}: expected at least 0")
+
+    def share(self, part: float) -> "Budget":
+        """A part, 0 to 1, of it."""
+        return Budget(
+            None if self.refits is None else round(part * self.refits),
+            None if self.seconds is None else part * self.seconds,
+            None if self.simulations is None else round(part * self.simulations),
+        )
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a solve stands, for a progress bar."""
+
+    best_total: float  # r_all of the best shape so far
+    n_steps: int
+    n_refits: int
+    n_nodes: int = 0  # of the search tree, where there is one
+
+
+class Meter:
+    """Counts the work of one solve, reports it, and says when the budget is spent.
+
+    What a part of it (`part`) counts, it counts, too.
+    """
+
+    def __init__(
+        self, budget: Budget, on_progress: Callable[[Progress], None] | None = None, whole: "Meter | None" = None
+    ) -> None:
+        self._budget = budget
+        self._on_progress = on_progress
+        self._whole = whole
+        self._began = time.perf_counter()
+        self._n_steps = self._n_refits = self._n_simulations = self._n_nodes = 0
+        self._best_total = float("-inf")
+        self.stopped_by = "finished"
+
+    @classmethod
+    def unlimited(cls) -> "Meter":
+        """A meter that never says stop."""
+        return cls(Budget())
+
+    def part(self, share: float) -> "Meter":
+        """A meter for a share, 0 to 1, of what is left."""
+        return Meter(self.rest().share(share), whole=self)
+
+    def add(self, states: Sequence[State]) -> None:
+        """Note the states that one step of work produced."""
+        best = max((state.score.total for state in states), default=float("-inf"))
+        self.count(sum(state.n_refits for state in states), best)
+
+    def add_simulation(self, n_nodes: int) -> None:
+        """Note a simulation that made so many new nodes, before what it did is added or counted."""
+        self._n_simulations += 1
+        self._n_nodes += n_nodes
+        if self._whole is not None:
+            self._whole.add_simulation(n_nodes)
+
+    def count(self, n_refits: int, best_total: float) -> None:
+        """Note one step of work that took `n_refits` and whose best shape has r_all `best_total`."""
+        self._n_steps += 1
+        self._n_refits += n_refits
+        self._best_total = max(self._best_total, best_total)
+        if self._whole is not None:
+            self._whole.count(n_refits, best_total)
+        if self._on_progress is not None:
+            self._on_progress(Progress(self._best_total, self._n_steps, self._n_refits, self._n_nodes))
+
+    def add_refits(self, n_refits: int) -> None:
+        """Note refits that are no step of the work, and so nothing to report."""
+        self._n_refits += n_refits
+        if self._whole is not None:
+            self._whole.add_refits(n_refits)
+
+    def spent(self) -> bool:
+        """Whether the budget is used up, or the one that this is a part of."""
+        used = {"refits": self._n_refits, "seconds": self._seconds(), "simulations": self._n_simulations}
+        for name, limit in vars(self._budget).items():
+            if limit is not None and used[name] >= limit:
+                self.stopped_by = name
+                break
+        if self._whole is not None and self._whole.spent():
+            self.stopped_by = self._whole.stopped_by
+        return self.stopped_by != "finished"
+
+    def rest(self) -> Budget:
+        """What is left of the budget."""
+        refits, seconds, simulations = self._budget.refits, self._budget.seconds, self._budget.simulations
+        return Budget(
+            None if refits is None else max(0, refits - self._n_refits),
+            None if seconds is None else max(0.0, seconds - self._seconds()),
+            None if simulations is None else max(0, simulations - self._n_simulations),
+        )
+
+    def affordable(self, starts: Iterable[_Start]) -> list[_Start]:
+        """As many of the things to refit as refits are left for."""
+        return list(islice(starts, self.rest().refits))
+
+    def stats(self) -> Stats:
+        """The work so far."""
+        return Stats(self._n_refits, self._seconds(), self.stopped_by)
+
+    def _seconds(self) -> float:
+        return time.perf_counter() - self._began

@@ -1,0 +1,1 @@
+"""What the commands of agents share: running, Ctrl-C, solving, results, reports, wishes."""

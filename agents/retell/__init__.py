@@ -1,0 +1,1 @@
+"""One construction told again: edited, varied, or for another silhouette."""
