@@ -21,8 +21,8 @@ from PIL import Image
 from tests.commands import Run, Said, runner
 from tests.drawings import HOUSE, L_SHAPE, SQUARE, painted
 from tests.shapes import shapely_coverage
-from training import evaluate_run
 from training.evaluate import main
+from training.evaluation import run as evaluate_run
 from training.parallel import Done
 from training.records import Record, RecordWriter, read_info, read_records
 

@@ -22,8 +22,8 @@ from autopoly_env.files import write_atomically
 from autopoly_env.targets import ConstructionTargets
 from tests.commands import Run, runner
 from tests.shapes import shapely_coverage
-from training.build_dataset import MAX_N, MAX_SEED, SPLITS, Settings, build_dataset
-from training.dataset import Example, checksum, pack, read_manifest, read_shards, unpack
+from training.datasets.build import MAX_N, MAX_SEED, SPLITS, Settings, build_dataset
+from training.datasets.shards import Example, checksum, pack, read_manifest, read_shards, unpack
 from training.make_dataset import main
 
 ROOT = Path(__file__).parent.parent
@@ -118,7 +118,7 @@ def interrupt_after(monkeypatch: pytest.MonkeyPatch, n_shards: int) -> None:
         written.append(path)
         return write_atomically(path, data)
 
-    monkeypatch.setattr("training.build_dataset.write_atomically", write)
+    monkeypatch.setattr("training.datasets.build.write_atomically", write)
 
 
 def test_resume__gives_the_same_bytes_and_remakes_nothing_that_is_there(
@@ -271,7 +271,7 @@ def test_full_disk__leaves_what_was_written_whole(run: Run, monkeypatch: pytest.
         raise OutputError(f"cannot write {path} (No space left on device); give a writable path")
 
     with monkeypatch.context() as patched:
-        patched.setattr("training.build_dataset.write_atomically", no_room)
+        patched.setattr("training.datasets.build.write_atomically", no_room)
         said = run("constructions", "--n", 3, "--out", "data", *SERIAL)
     assert (said.code, len(said.err.splitlines())) == (1, 1)
     assert "No space left" in said.err
@@ -378,7 +378,7 @@ def test_silhouettes__of_a_shapenet_folder_take_a_category_and_a_split(run: Run)
 
 def test_engine__gives_back_every_shard_as_it_is_done(tmp_path: Path) -> None:
     """What `build_dataset` tells its caller is what is on the disk."""
-    from training.build_dataset import begin_dataset
+    from training.datasets.build import begin_dataset
 
     settings = Settings("constructions", resolution=64)
     manifest = begin_dataset(tmp_path, settings, 4, 2, resume=False, fresh=False)

@@ -32,8 +32,8 @@ from autopoly_env.raster import coverage
 from autopoly_env.score import ScoreWeights
 from autopoly_env.simulator import Simulator
 from tests.drawings import BOTTLE, FRAME, HOUSE, painted
-from training.nfap_data import SourceConfig
-from training.samples import LabelConfig, Live, NfapStream, collate
+from training.networks.labelling import SourceConfig
+from training.networks.samples import LabelConfig, Live, NfapStream, collate
 
 torch.set_num_threads(1)  # as tests run beside each other
 

@@ -26,15 +26,16 @@ from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import ActionCodec
 from autopoly_env.score import ScoreWeights
 from autopoly_env.simulator import Simulator
-from training import rl_clone, rl_export, train_rl
-from training.nfap_data import SourceConfig, build_trajectory
+from training import rl_clone, train_rl
+from training.networks.labelling import SourceConfig, build_trajectory
+from training.networks.samples import LabelConfig, collate, stored
+from training.networks.trainer import Place, train
+from training.networks.trajectories import Shard, Trajectory
 from training.options import read_config
+from training.policies import export as rl_export
+from training.policies.config import OptimConfig, TrainRlConfig
+from training.policies.exam import HELD_OUT, Exam, exams_of, mean_final, play_all, sit_all
 from training.rl_clone import CloneConfig, CloneTask, prepared, sample_of, turned
-from training.rl_config import OptimConfig, TrainRlConfig
-from training.rl_exam import HELD_OUT, Exam, exams_of, mean_final, play_all, sit_all
-from training.samples import LabelConfig, collate, stored
-from training.trainer import Place, train
-from training.trajectories import Shard, Trajectory
 
 torch.set_num_threads(1)  # as tests run beside each other
 

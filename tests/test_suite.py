@@ -12,9 +12,9 @@ from agents.budget import Budget, Progress
 from agents.registry import AGENTS
 from autopoly_env.errors import ConfigError
 from autopoly_env.score import ScoreWeights
+from training.evaluation.suite import FOLDER, GROUND_TRUTH, Printed, chosen, find_suite, task_seed, with_budget
+from training.evaluation.tasks import Curve, Task, solve_task
 from training.options import plain
-from training.suite import FOLDER, GROUND_TRUTH, Printed, chosen, find_suite, task_seed, with_budget
-from training.tasks import Curve, Task, solve_task
 
 SUITES = sorted(path.stem for path in FOLDER.glob("*.yaml"))
 MINIMAL = "targets: {kind: construction, n: 2}\nagents: [{agent: trace}]\n"

@@ -19,12 +19,23 @@ from autopoly_env.errors import ConfigError, RunError
 from autopoly_env.mesh import is_sane
 from autopoly_env.score import ScoreWeights
 from autopoly_env.simulator import Simulator
-from training import finish, make_expert, train_nfap, train_warpnet
-from training.nfap_data import SourceConfig, build_trajectory
+from training import make_expert, train_nfap, train_warpnet
+from training.networks import finish
+from training.networks.labelling import SourceConfig, build_trajectory
+from training.networks.samples import (
+    LabelConfig,
+    Live,
+    NfapStream,
+    WarpStream,
+    batches,
+    collate,
+    nfap_sample,
+    stored,
+    turned,
+)
+from training.networks.trainer import OptimConfig, Place, RunConfig, train
+from training.networks.trajectories import STOPPED, Shard, Trajectory
 from training.options import read_config
-from training.samples import LabelConfig, Live, NfapStream, WarpStream, batches, collate, nfap_sample, stored, turned
-from training.trainer import OptimConfig, Place, RunConfig, train
-from training.trajectories import STOPPED, Shard, Trajectory
 
 torch.set_num_threads(1)  # as tests run beside each other
 
@@ -315,7 +326,7 @@ def test_run__leaves_log_pictures_report_and_weights(finished: Path) -> None:
 def test_run__that_was_killed_goes_on_along_the_same_curve(
     shards: Path, finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from training import trainer
+    from training.networks import trainer
 
     update, steps = trainer._update, []
 

@@ -13,7 +13,7 @@ from agents.commands.running import FAILURE, INTERRUPTED, run_command
 from autopoly_env.errors import ConfigError
 
 if TYPE_CHECKING:
-    from training.suite import Suite
+    from training.evaluation.suite import Suite
 
 FOLDER = Path("out/evaluate")
 PLAIN_WIDTH = 132  # of a table that goes to a file
@@ -75,8 +75,8 @@ def evaluate(
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress.")] = False,
 ) -> int:
     """Check what can be checked before the work, do it, show the table; return the exit code."""
-    from training.evaluate_run import Machines, Shard, run_suite
-    from training.run_folder import merge as merge_runs
+    from training.evaluation.folder import merge as merge_runs
+    from training.evaluation.run import Machines, Shard, run_suite
 
     _check_flags(suite, resume=resume, fresh=fresh, merge=merge)
     if merge:
@@ -109,7 +109,7 @@ def _read(
     given: str, overrides: list[str], budget: str | None, agents: str | None, baseline: str | None
 ) -> "tuple[Suite, set[str]]":
     """The suite with all that the command line says about it, and the labels to run (none: all)."""
-    from training.suite import chosen, find_suite, with_budget
+    from training.evaluation.suite import chosen, find_suite, with_budget
 
     suite = find_suite(given, overrides)
     if budget is not None:
@@ -123,9 +123,9 @@ def _finish(folder: Path, baseline: str | None, as_json: bool) -> int:
     """Write and show the table of a run; 1 if some of its tasks failed."""
     from rich.console import Console
 
+    from training.evaluation.folder import suite_of
+    from training.evaluation.table import as_records, as_rich, table_of, write_tables
     from training.records import read_info, read_records
-    from training.run_folder import suite_of
-    from training.run_table import as_records, as_rich, table_of, write_tables
 
     info, records = read_info(folder), read_records(folder)
     suite = suite_of(info, folder)

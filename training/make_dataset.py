@@ -25,7 +25,7 @@ Examples:
   python -m training.make_dataset silhouettes ShapeNetCore.v2 --categories chair,lamp --split test --out data/shapenet
 
 What was killed goes on with --resume. Target number i depends on --seed and i alone: neither --workers nor
---shard-size nor --n changes it. No two seeds or splits share a target. Read with training.dataset.read_shards.
+--shard-size nor --n changes it. No two seeds or splits share a target. Read with training.datasets.shards.read_shards.
 
 Exit codes: 0 all is well, 1 something failed, 2 wrong usage, 130 Ctrl-C.
 """
@@ -73,7 +73,7 @@ def constructions(
     quiet: Quiet = False,
 ) -> int:
     """Shapes of the random construction simulator, with the sequences that made them."""
-    from training.build_dataset import Settings
+    from training.datasets.build import Settings
 
     settings = Settings("constructions", split, seed, resolution, _range(difficulty), operators)
     machines = {"engine": engine, "n_workers": workers, "address": ray_address}
@@ -97,7 +97,7 @@ def objects(
     quiet: Quiet = False,
 ) -> int:
     """Drawings of man-made things; how to construct them is not known."""
-    from training.build_dataset import Settings
+    from training.datasets.build import Settings
 
     settings = Settings("objects", split, seed, resolution, families=families)
     machines = {"engine": engine, "n_workers": workers, "address": ray_address}
@@ -110,8 +110,8 @@ def verify(
     quiet: Quiet = False,
 ) -> int:
     """Check every shard's checksum and content, and replay every construction sequence."""
-    from training.build_dataset import check_dataset
-    from training.dataset import read_manifest
+    from training.datasets.build import check_dataset
+    from training.datasets.shards import read_manifest
 
     manifest = read_manifest(folder)
     n_wrong = 0
@@ -144,7 +144,7 @@ def silhouettes(
 ) -> int:
     """Draw the silhouette of every model as OUT/NAME.png; OUT/silhouettes.jsonl says what became of each."""
     from autopoly_env.files import write_atomically
-    from training.model_silhouettes import draw_model, needs_trimesh, tasks_of, write_index
+    from training.datasets.models import draw_model, needs_trimesh, tasks_of, write_index
     from training.parallel import map_tasks
 
     tasks = tasks_of(models, view, resolution, categories, split)
@@ -168,8 +168,8 @@ def _build(
     settings: Any, out: Path, n: int, shard_size: int, machines: dict[str, Any], resume: bool, fresh: bool, quiet: bool
 ) -> int:
     """Make the data set and tell of it; returns the exit code."""
-    from training.build_dataset import begin_dataset, build_dataset
-    from training.dataset import ShardInfo
+    from training.datasets.build import begin_dataset, build_dataset
+    from training.datasets.shards import ShardInfo
 
     if resume and fresh:
         raise ConfigError("--resume and --fresh: give one of them")

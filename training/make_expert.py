@@ -12,10 +12,10 @@ import typer
 from agents.commands.running import GOES_ON, run_command
 from autopoly_env.errors import ConfigError, RunError
 from autopoly_env.files import write_atomically
-from training.nfap_data import SourceConfig, build_trajectory
+from training.networks.labelling import SourceConfig, build_trajectory
+from training.networks.trajectories import VERSION, Shard
 from training.options import plain, read_config
 from training.parallel import map_tasks
-from training.trajectories import VERSION, Shard
 
 SHARD_SIZE = 64  # constructions
 

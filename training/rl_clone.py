@@ -34,13 +34,13 @@ from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.files import write_atomically
 from autopoly_env.observation import PADDING, Observation
 from autopoly_env.operators import OPERATORS, Action, ActionCodec
-from training.net_metrics import mean_rows
+from training.networks.metrics import mean_rows
+from training.networks.samples import Batch, HeldOut, LabelConfig, Sample, Stored, stored
+from training.networks.trainer import OptimConfig, RunConfig, place_of, train
+from training.networks.trajectories import Labelled, Trajectory
 from training.options import plain, read_config
-from training.rl_config import EnvConfig
-from training.rl_exam import exams_of, mean_final, sit_all, told
-from training.samples import Batch, HeldOut, LabelConfig, Sample, Stored, stored
-from training.trainer import OptimConfig, RunConfig, place_of, train
-from training.trajectories import Labelled, Trajectory
+from training.policies.config import EnvConfig
+from training.policies.exam import exams_of, mean_final, sit_all, told
 
 _PICTURES = ("rendering", "target")
 _HOPELESS = -1e3  # r_all points: gain of an action whose outcome is not known

@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field
 
 from autopoly_env.errors import ConfigError
-from training.nfap_data import SourceConfig
-from training.samples import Live, Trajectories, stored
+from training.networks.labelling import SourceConfig
+from training.networks.samples import Live, Trajectories, stored
 
 
 @dataclass(frozen=True)

@@ -22,13 +22,13 @@ from torch import Tensor, nn
 from agents.commands.running import GOES_ON, run_command
 from agents.guided.config import NfapConfig
 from agents.guided.nfap import Foresight, NfapLabels, NfapNet, loss_terms
-from training.finish import finish_run
-from training.net_metrics import mean_rows, nfap_metrics
-from training.net_pictures import draw_nfap
+from training.networks.finish import finish_run
+from training.networks.metrics import mean_rows, nfap_metrics
+from training.networks.pictures import draw_nfap
+from training.networks.samples import Batch, HeldOut, LabelConfig, NfapStream
+from training.networks.trainer import OptimConfig, RunConfig, place_of, train
 from training.options import plain, read_config
-from training.samples import Batch, HeldOut, LabelConfig, NfapStream
 from training.settings import DataConfig
-from training.trainer import OptimConfig, RunConfig, place_of, train
 
 N_DRAWN = 6  # samples in a picture of the log
 

@@ -36,9 +36,9 @@ from agents.rl.policies import net_of, put_net
 from agents.rl.weights import load_policy, read_policy_meta, save_policy
 from autopoly_env.errors import ConfigError, RunError
 from training.options import check_same_run, plain, read_config
-from training.rl_config import HARMLESS, RunConfig, TrainRlConfig
-from training.rl_exam import exams_of, mean_final, sit_all, told
-from training.rl_export import export_policy
+from training.policies.config import HARMLESS, RunConfig, TrainRlConfig
+from training.policies.exam import exams_of, mean_final, sit_all, told
+from training.policies.export import export_policy
 from training.run_log import RunLog
 
 _LOG_EVERY = 5_000  # steps

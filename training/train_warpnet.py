@@ -23,13 +23,13 @@ from agents.commands.running import GOES_ON, run_command
 from agents.guided.config import WarpConfig
 from agents.guided.warp import Theta, Warp, WarpNet, loss_terms
 from autopoly_env.errors import ConfigError
-from training.finish import finish_run
-from training.net_metrics import mean_rows, warp_metrics
-from training.net_pictures import draw_warp
+from training.networks.finish import finish_run
+from training.networks.metrics import mean_rows, warp_metrics
+from training.networks.pictures import draw_warp
+from training.networks.samples import Batch, HeldOut, WarpStream
+from training.networks.trainer import OptimConfig, RunConfig, place_of, train
 from training.options import plain, read_config
-from training.samples import Batch, HeldOut, WarpStream
 from training.settings import DataConfig
-from training.trainer import OptimConfig, RunConfig, place_of, train
 
 N_DRAWN = 8  # samples in a picture of the log
 

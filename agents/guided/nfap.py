@@ -165,7 +165,7 @@ class NfapLabels:
 
     @classmethod
     def of(cls, batch: Mapping[str, Tensor]) -> "NfapLabels":
-        """From the arrays of `training.samples.nfap_sample`."""
+        """From the arrays of `training.networks.samples.nfap_sample`."""
         candidates = candidates_of(batch)
         own = {name: batch[name] for name in cls.__dataclass_fields__ if name != "candidates"}
         return cls(candidates=candidates, **own)

@@ -14,8 +14,8 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from training.evaluation.tasks import Task
 from training.records import Record
-from training.tasks import Task
 
 SECONDS_A_LINE = 30.0  # where there is no terminal
 MOST_FAILURES = 20  # that are told one by one

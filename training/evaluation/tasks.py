@@ -15,10 +15,10 @@ from autopoly_env.mesh import PolyMesh
 from autopoly_env.score import Score
 from autopoly_env.sequence import ConstructionSequence, Lesson
 from autopoly_env.silhouette import Silhouette
+from training.evaluation.suite import GROUND_TRUTH, Entry, Suite, task_seed
+from training.evaluation.targets import Target, load_target
 from training.parallel import one_line
 from training.records import TARGET_SIZE, MeshData, Outcome, Record
-from training.suite import GROUND_TRUTH, Entry, Suite, task_seed
-from training.suite_targets import Target, load_target
 
 N_CURVE = 60  # points of a curve at most
 WARM_UP = Budget(refits=30)

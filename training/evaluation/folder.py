@@ -7,6 +7,7 @@ from typing import Any
 
 from autopoly_env.errors import OutputError, RunError
 from autopoly_env.files import write_atomically
+from training.evaluation.suite import Suite
 from training.options import build_config, plain
 from training.records import (
     RECORDS_FILE,
@@ -20,7 +21,6 @@ from training.records import (
     read_records,
     target_path,
 )
-from training.suite import Suite
 
 TABLES = ("table.md", "table.csv")
 

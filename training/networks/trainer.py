@@ -21,9 +21,9 @@ from torch.nn.parallel import DistributedDataParallel
 
 from autopoly_env.errors import ConfigError, RunError
 from autopoly_env.files import write_atomically
+from training.networks.samples import Batch, batches
 from training.options import check_same_run
 from training.run_log import RunLog
-from training.samples import Batch, batches
 
 _HARMLESS = ("n_workers", "n_threads", "device", "log_every", "save_every")  # a run may go on with other ones
 

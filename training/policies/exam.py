@@ -17,7 +17,7 @@ from autopoly_env.score import ScoreWeights
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator, State
 from autopoly_env.targets import ConstructionTargets, TargetSource, make_targets
-from training.rl_config import EnvConfig
+from training.policies.config import EnvConfig
 
 HELD_OUT = 2**30  # first seed that training never draws; the split "test" begins at 2^31
 _BATCH = 64  # games at once

@@ -8,13 +8,13 @@ from pathlib import Path
 
 from autopoly_env.errors import ConfigError
 from autopoly_env.files import write_atomically
-from training.evaluate_display import Display
+from training.evaluation.display import Display
+from training.evaluation.folder import begin, claim
+from training.evaluation.suite import GROUND_TRUTH, Suite, takes_seed
+from training.evaluation.targets import Target
+from training.evaluation.tasks import Task, solve_task
 from training.parallel import check_engine, map_tasks
 from training.records import target_path
-from training.run_folder import begin, claim
-from training.suite import GROUND_TRUTH, Suite, takes_seed
-from training.suite_targets import Target
-from training.tasks import Task, solve_task
 
 
 @dataclass(frozen=True)

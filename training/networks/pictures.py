@@ -9,7 +9,7 @@ from torch import Tensor
 from agents.guided.nfap import Foresight
 from agents.guided.tps import warp_pictures
 from agents.guided.warp import Warp, WarpNet
-from training.samples import Batch
+from training.networks.samples import Batch
 
 _GAP = 2  # pixels between pictures
 _SCALE = 2

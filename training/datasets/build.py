@@ -13,7 +13,7 @@ from autopoly_env.errors import AutoPolyError, ConfigError, OutputError, RunErro
 from autopoly_env.files import write_atomically
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.targets import ConstructionTargets, ObjectTargets, split_seed
-from training.dataset import MANIFEST, Example, Manifest, ShardInfo, checksum, pack, read_manifest, read_shard
+from training.datasets.shards import MANIFEST, Example, Manifest, ShardInfo, checksum, pack, read_manifest, read_shard
 from training.parallel import map_tasks
 
 MAX_N = 2**22  # targets of a data set: as many seeds does it have to itself

@@ -23,8 +23,8 @@ from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import OPERATORS, STOP, Action
 from autopoly_env.placement import Disagreement, starts
-from training.nfap_data import SourceConfig, build_trajectory
-from training.trajectories import Labelled, Shard, Trajectory
+from training.networks.labelling import SourceConfig, build_trajectory
+from training.networks.trajectories import Labelled, Shard, Trajectory
 
 Sample = dict[str, np.ndarray]
 Batch = dict[str, Tensor]

@@ -42,7 +42,7 @@ metrics are of. No picture from outside was used.
 
 **Made for.** {rules}.
 
-**Held-out metrics**, one greedy play for each target (`training/rl_exam.py` says what they are)
+**Held-out metrics**, one greedy play for each target (`training/policies/exam.py` says what they are)
 
 | metric | value |
 |---|---|

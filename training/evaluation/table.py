@@ -13,10 +13,10 @@ from rich.table import Table
 from rich.text import Text
 
 from autopoly_env.files import write_atomically
+from training.evaluation.suite import GROUND_TRUTH, Printed, Suite
 from training.records import Record
 from training.report.comparison import Comparison, Row, Run, Series, rows_of
 from training.report.statistics import Interval
-from training.suite import GROUND_TRUTH, Printed, Suite
 
 FORMATS = {"r_sm": ".4f", "r_sc": ".1f", "r_si": ".2f", "r_all": ".2f", "refits": ".0f", "seconds": ".2f"}
 INTERVALS = {"r_sm": ".3f", "r_sc": ".1f", "r_si": ".2f", "r_all": ".1f"}  # formats of their ends

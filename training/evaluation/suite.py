@@ -20,8 +20,8 @@ from autopoly_env.errors import AutoPolyError, ConfigError
 from autopoly_env.score import ScoreWeights
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator
+from training.evaluation.targets import TargetSpec
 from training.options import build_config
-from training.suite_targets import TargetSpec
 
 FOLDER = Path(__file__).parent.parent / "configs" / "suite"
 WeightName = Literal["w_sm", "w_sc", "w_si", "w_locality"]

@@ -26,7 +26,7 @@ from autopoly_env.sequence.ids import element_index
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator, State
 from autopoly_env.targets import ConstructionTargets, ObjectTargets
-from training.trajectories import STOPPED, Labelled, Trajectory
+from training.networks.trajectories import STOPPED, Labelled, Trajectory
 
 _TRACED_PRICES = (0.5, 4.0)  # of complexity, in units of the one that counts, that traced outlines are made for
 _HELD_OUT = 2**30  # first seed of the held-out targets; all are of the split "train", none of "test"

@@ -12,7 +12,7 @@ from agents.guided.layers import n_parameters
 from agents.guided.weights import SHIPPED, save_weights
 from autopoly_env.files import write_atomically
 from training.describe_networks import cost
-from training.trainer import Task
+from training.networks.trainer import Task
 
 _ABOUT = {
     "nfap": "nFAP-Net: from the rendering of a mesh and a target silhouette to the next actions and where they work.",
@@ -70,7 +70,7 @@ never draws. No picture from outside was used.
 
 **Command.** `python -m training.train_{task.name} {shlex.join(sys.argv[1:])}`, seed {settings["run"]["seed"]}.
 
-**Held-out metrics** (what they mean: `training/net_metrics.py`)
+**Held-out metrics** (what they mean: `training/networks/metrics.py`)
 
 | metric | value |
 |---|---|

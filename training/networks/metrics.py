@@ -10,7 +10,7 @@ from torch import Tensor
 
 from agents.guided.config import CLASSES
 from agents.guided.nfap import Foresight, NfapNet, candidates_of
-from training.samples import Batch
+from training.networks.samples import Batch
 
 TOP = 3
 

@@ -1,0 +1,1 @@
+"""Agents measured on suites: targets, tasks, records as they come, tables."""

@@ -1,0 +1,1 @@
+"""Training of nFAP-Net and WarpNet: samples, labels, the trainer, what the networks reach and cost."""

@@ -1,0 +1,1 @@
+"""Training of policies: configuration, exams, and what is kept of them."""
