@@ -23,7 +23,7 @@ from autopoly_env.simulator import Simulator
 from training.evaluation.targets import TargetSpec
 from training.options import build_config
 
-FOLDER = Path(__file__).parent.parent / "configs" / "suite"
+FOLDER = Path(__file__).parents[2] / "configs" / "suite"
 WeightName = Literal["w_sm", "w_sc", "w_si", "w_locality"]
 GROUND_TRUTH = "ground truth"  # the row of the meshes that targets were made from
 
