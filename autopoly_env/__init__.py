@@ -1,10 +1,48 @@
-"""The world: what a mesh is, what an action does, what it is worth. Importing it makes the environments known."""
+"""The world: what a mesh is, what an action does, what it is worth. Importing it makes the environments known.
 
-from typing import Any
+The names in `__all__` are loaded when they are first asked for, so that importing stays light.
+"""
 
-from gymnasium.envs.registration import register, registry
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from gymnasium.envs.registration import register as _register
+from gymnasium.envs.registration import registry as _registry
+
+if TYPE_CHECKING:
+    from autopoly_env.mesh import PolyMesh
+    from autopoly_env.operators import OPERATORS, STOP, Action, Operator
+    from autopoly_env.score import Score, ScoreWeights
+    from autopoly_env.sequence import ConstructionSequence
+    from autopoly_env.silhouette import Silhouette, load_silhouette
+    from autopoly_env.simulator import Simulator, State
 
 __version__ = "0.1.0"
+
+__all__ = [
+    "OPERATORS",
+    "STOP",
+    "Action",
+    "ConstructionSequence",
+    "Operator",
+    "PolyMesh",
+    "Score",
+    "ScoreWeights",
+    "Silhouette",
+    "Simulator",
+    "State",
+    "load_silhouette",
+]
+
+_ROOMS = {
+    "mesh": ("PolyMesh",),
+    "operators": ("OPERATORS", "STOP", "Action", "Operator"),
+    "score": ("Score", "ScoreWeights"),
+    "sequence": ("ConstructionSequence",),
+    "silhouette": ("Silhouette", "load_silhouette"),
+    "simulator": ("Simulator", "State"),
+}
+_ROOM_OF = {name: room for room, names in _ROOMS.items() for name in names}
 
 # What differs between the environments; docs/environment.md says why.
 _ENVIRONMENTS: dict[str, dict[str, Any]] = {
@@ -25,12 +63,27 @@ _ENVIRONMENTS: dict[str, dict[str, Any]] = {
     },
 }
 
-for _name, _settings in _ENVIRONMENTS.items():
-    if _name not in registry:
-        register(
-            _name,
-            entry_point="autopoly_env.env:AutoPolyEnv",
-            vector_entry_point="autopoly_env.vector_env:AutoPolyVectorEnv",
-            kwargs=_settings,
-            order_enforce=False,  # the environment refuses steps out of turn itself
-        )
+
+def __getattr__(name: str) -> Any:
+    if name not in _ROOM_OF:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_ROOM_OF[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted([*__all__, "__version__"])
+
+
+def _make_known() -> None:
+    for name, settings in _ENVIRONMENTS.items():
+        if name not in _registry:
+            _register(
+                name,
+                entry_point="autopoly_env.env:AutoPolyEnv",
+                vector_entry_point="autopoly_env.vector_env:AutoPolyVectorEnv",
+                kwargs=settings,
+                order_enforce=False,  # the environment refuses steps out of turn itself
+            )
+
+
+_make_known()

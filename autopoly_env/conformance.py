@@ -7,17 +7,27 @@ Each check returns None, or raises ConformanceError naming the rule that was bro
 """
 
 import pickle
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 
 from autopoly_env.errors import AutoPolyError, ConfigError, ConformanceError, IllegalActionError
-from autopoly_env.mesh import PolyMesh, is_valid
-from autopoly_env.operators import OPERATORS, STOP, Operator, n_elements
+from autopoly_env.export.player import describe_step
+from autopoly_env.mesh import PolyMesh, images_of, is_valid
+from autopoly_env.operators import OPERATORS, STOP, Action, Operator, Start
+from autopoly_env.operators.operator import Mirroring
+from autopoly_env.raster import coverage
+from autopoly_env.sequence import ConstructionSequence
+from autopoly_env.sequence.ids import decoded
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator, State
 from autopoly_env.targets import TargetSource
+
+_AXIS = 0.5  # of the symmetric ones among the sample meshes
+_LOOK = 32  # pixels a side at which a rendering is looked at
+_NO_SCORE = {"iou": 0.0, "complexity": 0, "self_intersections": 0, "total": 0.0}
 
 
 def check_operator(operator: Operator, meshes: Iterable[PolyMesh] | None = None) -> None:
@@ -26,16 +36,19 @@ def check_operator(operator: Operator, meshes: Iterable[PolyMesh] | None = None)
     Rules: the mask has one bool per element and says where `apply` works; elsewhere it raises IllegalActionError. The
     mesh that comes out is valid; V - E + F is components - holes; (V, E, F) change by `changes` at most, an increase
     exactly; ids are never reused and what survives keeps its id; the same input gives the same mesh and is not touched.
+    A step of it, written as JSON, replays to the same mesh; what does not show leaves the rendering as it is; new
+    vertices come from somewhere; there are words for it; the mirror image of a symmetric mesh's action is one.
     """
-    for mesh in sample_meshes() if meshes is None else meshes:
-        n, mask = n_elements(mesh, operator.element), operator.legal_mask(mesh)
-        _require(
-            mask.shape == (n,) and mask.dtype == np.bool_, f"{operator.name} on {mesh}: the mask must be ({n},) bool"
-        )
-        for element in (-1, *range(n), n):
-            where = f"{operator.name} on {operator.element} {element} of {mesh}"
-            legal = 0 <= element < n and bool(mask[element])
-            _check_edit(operator, mesh, element, legal, where)
+    _require(operator.takes in ("", "all", "edge", "vertex"), f"{operator.name}: takes must be all, edge, vertex or ''")
+    with _known(operator):
+        for mesh in sample_meshes() if meshes is None else meshes:
+            n, mask = operator.element.count(mesh), operator.mask(mesh)
+            is_mask = isinstance(mask, np.ndarray) and mask.shape == (n,) and mask.dtype == np.bool_
+            _require(is_mask, f"{operator.name} on {mesh}: the mask must be ({n},) bool")
+            for element in (-1, *range(n), n):
+                where = f"{operator.name} on {operator.element.name} {element} of {mesh}"
+                legal = 0 <= element < n and bool(mask[element])
+                _check_edit(operator, mesh, element, legal, where)
 
 
 def check_simulator(simulator: Simulator, n_steps: int = 30, seed: int = 0) -> None:
@@ -129,6 +142,20 @@ def sample_meshes() -> list[PolyMesh]:
     ]
 
 
+@contextmanager
+def _known(operator: Operator) -> Iterator[None]:
+    """The operator under its name in the registry, whatever stood there before."""
+    before = OPERATORS.get(operator.name)
+    OPERATORS[operator.name] = operator
+    try:
+        yield
+    finally:
+        if before is None:
+            del OPERATORS[operator.name]
+        else:
+            OPERATORS[operator.name] = before
+
+
 def _check_edit(operator: Operator, mesh: PolyMesh, element: int, legal: bool, where: str) -> None:
     untouched = pickle.loads(pickle.dumps(mesh))
     if not legal:
@@ -147,6 +174,8 @@ def _check_edit(operator: Operator, mesh: PolyMesh, element: int, legal: bool, w
     for letter, old, new, change in zip("VEF", mesh.counts, after.counts, allowed, strict=True):
         kept = new - old == change if change > 0 else new - old <= change
         _require(kept, f"{where} changes {letter} by {new - old}, not by {change}")
+    _check_telling(operator, mesh, element, after, where)
+    _check_mirror(operator, mesh, element, where)
     for kind in ("vertex", "face"):
         ids, next_id = getattr(after, f"{kind}_ids"), getattr(mesh, f"next_{kind}_id")
         old_ids = getattr(mesh, f"{kind}_ids")
@@ -156,6 +185,56 @@ def _check_edit(operator: Operator, mesh: PolyMesh, element: int, legal: bool, w
         _require(
             survivors == [name for name in old_ids if name in ids], f"{where} puts the {kind} ids in another order"
         )
+
+
+def _check_telling(operator: Operator, mesh: PolyMesh, element: int, after: PolyMesh, where: str) -> None:
+    """What a sequence, a drawing and a reader are told of an edit."""
+    choice = operator.choose(mesh, element)
+    _require(choice is None or operator.choice is not None, f"{where} makes a choice that no codec writes down")
+    transition = (Action(operator.name, element), choice, after, _NO_SCORE)
+    sequence = ConstructionSequence.record({}, mesh, _NO_SCORE, [transition])
+    replayed = ConstructionSequence.from_json(sequence.to_json())
+    _require(replayed.final() == after, f"{where}: the step does not replay to the same mesh")
+    _, again, found = decoded(mesh, replayed.steps[0])
+    _require((again, found) == (element, choice), f"{where}: its ids do not lead back to element and choice")
+    words = describe_step(replayed.steps[0], 0)
+    _require(all((words.title, words.done, *words.keys)), f"{where}: there are no words for it")
+    sources = operator.sources_of(mesh, element, choice, after)
+    n_new = after.next_vertex_id - mesh.next_vertex_id
+    _require(
+        sources.shape == (n_new, 2) and bool(np.isfinite(sources).all()),
+        f"{where}: sources must be ({n_new}, 2) finite places, one for each new vertex",
+    )
+    if not operator.shows(mesh, element):
+        same = np.allclose(coverage(mesh, _LOOK), coverage(after, _LOOK), atol=1e-9)
+        _require(same, f"{where} does not show, it says, yet the rendering changes")
+    if operator.blender is not None:
+        arguments = operator.blender(mesh, element, choice)
+        _require(isinstance(arguments, list), f"{where}: blender must give a list of arguments")
+
+
+def _check_mirror(operator: Operator, mesh: PolyMesh, element: int, where: str) -> None:
+    """On a symmetric mesh every start that the operator gives is symmetric, too."""
+    images = images_of(mesh, _AXIS)
+    if operator.mirror is None or images is None or not operator.shows(mesh, element):
+        return
+    choice = operator.choose(mesh, element)
+    plain = Start(choice, operator.apply(mesh, element, choice))
+    of = Mirroring(mesh, images, _AXIS, Action(operator.name, element))
+    try:
+        starts = list(operator.mirror(of, plain))
+    except IllegalActionError:  # the action alone is legal, both together are not
+        return
+    for start in starts:
+        _require(
+            images_of(start.mesh, _AXIS) is not None, f"{where}: with its mirror image the outline is not symmetric"
+        )
+        if start.halfway is not None:
+            between = operator.apply(start.halfway.mesh, start.halfway.action.element, start.halfway.choice)
+            _require(
+                between.with_vertices(start.mesh.vertices) == start.mesh,
+                f"{where}: its mirror image is not what leads from halfway to the start",
+            )
 
 
 def _checked_transition(simulator: Simulator, state: State, action: Any, where: str) -> State:

@@ -4,7 +4,7 @@ A step is S' = S . t . g (paper, section 3.4): a topological action t, then g, t
 refit to the target finds. States are immutable values; a simulator draws no random numbers.
 """
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import Any
@@ -16,10 +16,9 @@ from autopoly_env.arrays import BoolArray
 from autopoly_env.compute import Job, Routine, map_threads, run
 from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.guidance import Guidance, ImportanceSource, importance_settings, weighted
-from autopoly_env.guidance.mirror import Beginning, Halfway, mirrored_starts
 from autopoly_env.mesh import PolyMesh, defects_of
-from autopoly_env.operators import STOP, Action, Choice, legal_actions, preset
-from autopoly_env.placement import Disagreement, leaves_outline_alone, starts
+from autopoly_env.operators import STOP, Action, Choice, Halfway, Operator, legal_actions, preset
+from autopoly_env.placement import Disagreement, Trial, tried
 from autopoly_env.refit import FROM_AFAR, LOCAL, THOROUGH, RefitConfig, RefitTarget, holding, refit, tune
 from autopoly_env.score import Score, ScoreWeights, score
 from autopoly_env.sequence import ConstructionSequence
@@ -52,9 +51,9 @@ class State:
 class Simulator:
     """One target, and the rules under which meshes are built towards it.
 
-    Parameters: `silhouette`, the target; `operators`, a preset or names ("paper", "full", "edge_subdivide,..."); the
-    `resolution` R at which states are refitted and scored, in pixels; `weights` of the score; the game ends at
-    `max_steps` and where the IoU reaches `match_threshold`.
+    Parameters: `silhouette`, the target; `operators`, presets or names ("paper", "full,my.module:my_operator",
+    "edge_subdivide,..."), or a list of names and Operators; the `resolution` R at which states are refitted and scored,
+    in pixels; `weights` of the score; the game ends at `max_steps` and where the IoU reaches `match_threshold`.
 
     A user may guide the construction (docs/guidance.md): `importance`, an image that says where matching matters;
     `start`, the mesh to begin with, or a sequence to go on from; `locked`, ids of its vertices that are neither moved
@@ -67,7 +66,7 @@ class Simulator:
         self,
         silhouette: Silhouette,
         *,
-        operators: str = "full",
+        operators: str | Iterable[str | Operator] = "full",
         resolution: int = 128,
         weights: ScoreWeights | None = None,
         max_steps: int = 100,
@@ -185,7 +184,7 @@ class Simulator:
         actions = [a for a in legal_actions(state.mesh, self.operators) if self.guidance.allows(state.mesh, a)]
         if self.guidance.axis is not None:  # only trying tells whether there is room for a mirror image
             disagreement = Disagreement(state.mesh, self.silhouette)
-            actions = [action for action, _ in self._possible(disagreement, actions)]
+            actions = [trial.action for trial in self._possible(disagreement, actions)]
         return [STOP, *actions]
 
     def transition(self, state: State, action: Action) -> State:
@@ -199,8 +198,8 @@ class Simulator:
         if action == STOP:
             return replace(state, done="stop", action=STOP, choice=None, n_refits=0, halfway=None)
         self._check_operator(action)
-        begin = self._begin(Disagreement(state.mesh, self.silhouette), action)
-        return (yield from self._refitted(state, action, begin))
+        trial = self._tried(Disagreement(state.mesh, self.silhouette), action)
+        return (yield from self._refitted(state, trial))
 
     def idle(self, state: State) -> State:
         """The state one step later, nothing done: what a player that asks for an illegal action gets."""
@@ -219,46 +218,42 @@ class Simulator:
             if action != STOP:
                 self._check_operator(action)
         disagreement = Disagreement(state.mesh, self.silhouette)
-        jobs = self._possible(disagreement, [action for action in chosen if action != STOP])
-        return map_threads(lambda job: run(self._refitted(state, *job)), jobs)
+        trials = self._possible(disagreement, [action for action in chosen if action != STOP])
+        return map_threads(lambda trial: run(self._refitted(state, trial)), trials)
 
     def _check_operator(self, action: Action) -> None:
         if action.operator not in self.operators:
             raise IllegalActionError(f"{action.operator!r} is not one of this simulator's operators: {self.operators}")
 
-    def _begin(self, disagreement: Disagreement, action: Action) -> list[Beginning]:
-        """The meshes from which to refit after an action. Raises IllegalActionError where it is not legal."""
-        if self.guidance.axis is not None:
-            begin = mirrored_starts(disagreement, action, self.guidance.axis)
-        else:
-            begin = [(choice, mesh, None) for choice, mesh in starts(disagreement, action)]
-        self.guidance.check_locks(disagreement.mesh, action, begin[0][1])
-        return begin
+    def _tried(self, disagreement: Disagreement, action: Action) -> Trial:
+        """The action, not refitted yet. Raises IllegalActionError where it is not legal."""
+        trial = tried(disagreement, action, self.guidance.axis)
+        self.guidance.check_locks(disagreement.mesh, action, trial.starts[0].mesh)
+        return trial
 
-    def _possible(
-        self, disagreement: Disagreement, actions: Sequence[Action]
-    ) -> Iterator[tuple[Action, list[Beginning]]]:
-        """The actions that are legal after all, and where they begin."""
+    def _possible(self, disagreement: Disagreement, actions: Sequence[Action]) -> Iterator[Trial]:
+        """The actions that are legal after all."""
         for action in actions:
             try:
-                yield action, self._begin(disagreement, action)
+                yield self._tried(disagreement, action)
             except IllegalActionError:
                 continue
 
-    def _refitted(self, state: State, action: Action, begin: list[Beginning]) -> Routine[State]:
-        """The refit with the fewest crossings and flipped faces, and of those the best, from the given starts."""
-        if leaves_outline_alone(state.mesh, action):
-            choice, mesh, halfway = begin[0]
+    def _refitted(self, state: State, trial: Trial) -> Routine[State]:
+        """The refit with the fewest crossings and flipped faces, and of those the best, from the trial's starts."""
+        if not trial.shows:
+            choice, mesh, halfway = trial.starts[0]
             n_refits = 0
         else:
-            fits = yield [self._refit_job(mesh, THOROUGH, state.score.iou) for _, mesh, _ in begin]
+            fits = yield [self._refit_job(start.mesh, THOROUGH, state.score.iou) for start in trial.starts]
             k = min(range(len(fits)), key=lambda k: (sum(defects_of(fits[k].mesh)), fits[k].loss))
-            (choice, begun, halfway), mesh, n_refits = begin[k], fits[k].mesh, len(fits)
+            (choice, begun, halfway), mesh, n_refits = trial.starts[k], fits[k].mesh, len(fits)
             if self.docked(state.mesh, mesh) > 0.0:
                 held = yield from self._held(state, begun)
                 mesh = max((mesh, *held), key=lambda m: (-sum(defects_of(m)), self.score(m, state.mesh).total))
                 n_refits += len(held)
-        after = State(mesh, self.score(mesh, state.mesh), state.step + 1, "", action, choice, n_refits, halfway)
+        score = self.score(mesh, state.mesh)
+        after = State(mesh, score, state.step + 1, "", trial.action, choice, n_refits, halfway)
         return self._ended(after)
 
     def _held(self, state: State, begun: PolyMesh) -> Routine[list[PolyMesh]]:

@@ -1,14 +1,26 @@
 """Settings of every test run: one Numba thread a process, property tests that neither race nor wander, no litter."""
 
 import os
+from collections.abc import Iterator
 
 os.environ.setdefault("NUMBA_NUM_THREADS", "1")  # read when numba is imported, which no test has done yet
 
 import pytest
 from hypothesis import settings
 
+from autopoly_env.operators import OPERATORS
+
 settings.register_profile("autopoly", deadline=None, derandomize="CI" in os.environ)
 settings.load_profile("autopoly")
+
+
+@pytest.fixture(autouse=True)
+def own_operators() -> Iterator[None]:
+    """Operators that a test has made known are forgotten after it."""
+    known = dict(OPERATORS)
+    yield
+    OPERATORS.clear()
+    OPERATORS.update(known)
 
 
 @pytest.fixture(autouse=True)

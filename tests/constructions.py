@@ -6,7 +6,6 @@ from typing import Any
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import OPERATORS, Action
 from autopoly_env.sequence import ConstructionSequence
-from autopoly_env.sequence.ids import element_index
 
 TOTALS = (60.0, 70.0, 69.0, 72.0, 80.0, 80.5, 81.5, 75.25)  # of the start and of each step
 BEST = 6
@@ -28,7 +27,7 @@ def house(n_steps: int = len(STEPS), settings: dict[str, Any] | None = None) -> 
     transitions = []
     for k, (name, ids, to, moves) in enumerate(STEPS[:n_steps], 1):
         operator = OPERATORS[name]
-        element = element_index(mesh, operator.element, dict(ids))
+        element = operator.element.index(mesh, dict(ids))
         choice = operator.choose(mesh, element)
         if to is not None:
             face = mesh.face_index(ids["face"])

@@ -6,7 +6,16 @@ from hypothesis import given
 
 from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.mesh import PolyMesh, is_valid
-from autopoly_env.operators import OPERATORS, STOP, Action, ActionCodec, describe, legal_actions, preset
+from autopoly_env.operators import (
+    CAPACITY_PER_VERTEX,
+    OPERATORS,
+    STOP,
+    Action,
+    ActionCodec,
+    describe,
+    legal_actions,
+    preset,
+)
 from tests.strategies import meshes
 
 PAPER = tuple(operator.name for operator in preset("paper"))
@@ -114,7 +123,7 @@ def test_legal_mask__keeps_every_successor_within_the_capacities(mesh: PolyMesh)
         made = OPERATORS[action.operator].apply(mesh, action.element)
         assert is_valid(made)
         growth = np.subtract(made.counts, mesh.counts)
-        room = np.array([codec.capacity[kind] for kind in ("vertex", "edge", "face")])
+        room = np.array([CAPACITY_PER_VERTEX[kind] * codec.max_vertices for kind in ("vertex", "edge", "face")])
         assert ((growth <= 0) | (made.counts <= room)).all()
 
 

@@ -14,7 +14,7 @@ from autopoly_env.conformance import check_env, check_operator, check_simulator,
 from autopoly_env.env import AutoPolyEnv
 from autopoly_env.errors import ConformanceError
 from autopoly_env.mesh import PolyMesh, is_valid
-from autopoly_env.operators import OPERATORS, STOP, Action, Operator
+from autopoly_env.operators import EDGE, OPERATORS, STOP, Action, Operator
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator, State
 from autopoly_env.targets import ConstructionTargets, ObjectTargets
@@ -70,15 +70,26 @@ def shaken(_mesh: PolyMesh, _element: int, after: PolyMesh) -> PolyMesh:
     return after.with_vertices(after.vertices + np.random.default_rng().normal(size=after.vertices.shape))
 
 
+def lopsided(mesh: PolyMesh) -> PolyMesh:
+    return mesh.with_vertices(mesh.vertices + 0.01 * np.arange(len(mesh.vertices))[:, None])
+
+
 BROKEN_OPERATORS = {
-    "the mask must be": replace(SUBDIVIDE, legal_mask=lambda mesh: np.ones(3, bool)),
-    "yet it works": replace(SUBDIVIDE, legal_mask=lambda mesh: np.zeros(mesh.topology.n_edges, bool)),
+    "the mask must be": replace(SUBDIVIDE, mask=lambda mesh: np.ones(3, bool)),
+    "yet it works": replace(SUBDIVIDE, mask=lambda mesh: np.zeros(mesh.topology.n_edges, bool)),
     "by 1, not by": replace(SUBDIVIDE, changes=((2, 2, 0),)),
     "another order": edited(renamed),
     "reuses vertex ids": edited(reused),
     "not valid": edited(lambda _m, _e, after: replace(after, vertex_ids=after.vertex_ids[:-1])),
     "changed the mesh": edited(flattened),
     "same twice": edited(shaken),
+    "does not show, it says": replace(OPERATORS["edge_extrude"], shows=lambda mesh, e: False),
+    "no codec": replace(OPERATORS["face_split"], choice=None),
+    "sources must be": replace(SUBDIVIDE, sources=lambda *_: np.zeros((2, 2))),
+    "no words": replace(SUBDIVIDE, phrases=replace(SUBDIVIDE.told, keys=lambda step: ("",))),
+    "does not replay": replace(SUBDIVIDE, element=replace(EDGE, index=lambda mesh, ids: 0)),
+    "is not symmetric": replace(SUBDIVIDE, mirror=lambda of, start: iter([start._replace(mesh=lopsided(start.mesh))])),
+    "takes must be": replace(SUBDIVIDE, takes="everything"),
 }
 
 
@@ -87,7 +98,19 @@ def test_broken_operator__is_caught_with_the_rule_it_breaks(rule: str) -> None:
     with pytest.raises(ConformanceError) as caught:
         check_operator(BROKEN_OPERATORS[rule])
     assert rule in str(caught.value)
-    assert "edge_subdivide on" in str(caught.value)
+    assert BROKEN_OPERATORS[rule].name in str(caught.value)
+
+
+def test_operator_that_breaks_down__is_named_with_its_module_and_the_check() -> None:
+    broken = replace(SUBDIVIDE, name="edge_break", edit=lambda mesh, e, choice: 1 / 0)
+    with pytest.raises(
+        ConformanceError,
+        match=r"'edge_break' of .*test_conformance breaks its contract \(ZeroDivisionError.*check_operator",
+    ):
+        broken.apply(PolyMesh.rectangle(0.2, 0.2, 0.8, 0.8), 0)
+    short = replace(SUBDIVIDE, name="edge_break", mask=lambda mesh: np.ones(3, bool))
+    with pytest.raises(ConformanceError, match=r"its mask is \(3,\) bool; expected \(4,\) bool, one for each edge"):
+        short.legal_mask(PolyMesh.rectangle(0.2, 0.2, 0.8, 0.8))
 
 
 # --- simulators

@@ -22,8 +22,7 @@ from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import ConfigError, IllegalActionError, MeshError
 from autopoly_env.export import from_obj, load_obj, to_obj
 from autopoly_env.guidance import best_axis, weighted
-from autopoly_env.guidance.symmetry import images_of, mirrored
-from autopoly_env.mesh import PolyMesh, defects_of, is_valid
+from autopoly_env.mesh import PolyMesh, defects_of, images_of, is_valid, mirrored
 from autopoly_env.operators import STOP, Action, legal_actions
 from autopoly_env.placement import Disagreement
 from autopoly_env.placement.blame_kernels import MASS, MEAN_X

@@ -1,6 +1,7 @@
 """The operators: known effects on known meshes, every refusal, and what no walk may break."""
 
 from collections import Counter
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -10,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 
 from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.mesh import PolyMesh, canonical_hash, validate
-from autopoly_env.operators import OPERATORS, PRESETS, Choice, HoleChoice, n_elements, plan_hole, preset
+from autopoly_env.operators import OPERATORS, PRESETS, Choice, HoleChoice, plan_hole, preset, register
 from tests.strategies import Transition, walks
 
 L_CORNERS = [(0, 0), (0.5, 0), (0.5, 0.25), (0.25, 0.25), (0.25, 0.5), (0, 0.5)]  # 3 is the reflex one
@@ -54,7 +55,7 @@ def refusal(name: str, mesh: PolyMesh, element: int, choice: Choice | None = Non
     """The one line with which an operator refuses."""
     with pytest.raises(IllegalActionError) as caught:
         OPERATORS[name].apply(mesh, element, choice)
-    assert str(caught.value).startswith(f"{name} cannot work on {OPERATORS[name].element} {element}: ")
+    assert str(caught.value).startswith(f"{name} cannot work on {OPERATORS[name].element.name} {element}: ")
     assert "\n" not in str(caught.value)
     return str(caught.value)
 
@@ -376,7 +377,7 @@ def test_edge_dissolve__refuses_the_boundary_and_faces_that_share_more() -> None
 
 @pytest.mark.parametrize("name", OPERATORS)
 def test_operator__refuses_elements_that_are_not_there(name: str) -> None:
-    n = n_elements(grid(), OPERATORS[name].element)
+    n = OPERATORS[name].element.count(grid())
     assert f"the mesh has {n}; give 0..{n - 1}" in refusal(name, grid(), n)
     refusal(name, grid(), -1)
 
@@ -387,9 +388,28 @@ def test_preset__takes_a_name_or_a_list() -> None:
     ]  # fmt: skip
     assert preset("full") == tuple(OPERATORS.values()) == PRESETS["full"]
     assert preset("face_hole, edge_extrude") == (OPERATORS["face_hole"], OPERATORS["edge_extrude"])
-    for wrong in ("papers", "", "edge_extrude,", "edge_extrude,edge_extrude"):
-        with pytest.raises(ConfigError, match="give one of paper, full"):
+    assert preset(["paper", OPERATORS["face_hole"]]) == (*PRESETS["paper"], OPERATORS["face_hole"])
+    for wrong in ("papers", "", "edge_extrude,"):
+        with pytest.raises(ConfigError, match="give some of paper, full"):
             preset(wrong)
+    for wrong in ("edge_extrude,edge_extrude", "full,edge_extrude"):
+        with pytest.raises(ConfigError, match="edge_extrude stands there twice"):
+            preset(wrong)
+    for wrong in ("no.such.module:edge_cut", "autopoly_env.errors:edge_cut", "autopoly_env.errors:MeshError", ":"):
+        with pytest.raises(
+            ConfigError, match=r"module:name of an Operator|expected an autopoly_env.operators.Operator"
+        ):
+            preset(wrong)
+
+
+def test_register__refuses_names_that_are_taken_or_no_words() -> None:
+    other = replace(OPERATORS["edge_subdivide"], effect="another one")
+    with pytest.raises(ConfigError, match=r"is an operator of autopoly_env.operators.edge_subdivide already"):
+        register(other)
+    for name in ("stop", "full", "edge cut", ""):
+        with pytest.raises(ConfigError, match="cannot be called"):
+            register(replace(other, name=name))
+    assert register(OPERATORS["face_split"]) is OPERATORS["face_split"]
 
 
 EFFECTS = {
@@ -448,7 +468,7 @@ def test_legal_mask__is_true_exactly_where_apply_works(walk: list[Transition]) -
     mesh = walk[-1].after
     for operator in OPERATORS.values():
         mask = operator.legal_mask(mesh)
-        assert mask.shape == (n_elements(mesh, operator.element),)
+        assert mask.shape == (operator.element.count(mesh),)
         for element, is_legal in enumerate(mask):
             if is_legal:
                 validate(operator.apply(mesh, element))

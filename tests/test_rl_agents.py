@@ -149,10 +149,21 @@ def test_rl_prior__knows_nothing_of_meshes_that_do_not_fit() -> None:
 # --- what is refused ---
 
 
-def test_other_operators__are_refused_with_both_named(weights: str) -> None:
+def test_operators_that_only_one_side_knows__are_masked(weights: str) -> None:
     agent = make_agent("maskable-ppo", weights=weights)
-    with pytest.raises(ConfigError, match=r"maskable-ppo was trained with operators full .*with paper"):
-        agent.solve(game(operators="paper"))
+    fewer = game(operators="edge_subdivide,vertex_dissolve")
+    taken = {step.operator for step in agent.solve(fewer).sequence.steps}
+    assert taken and taken <= {"edge_subdivide", "vertex_dissolve"}
+    more = game(operators="full,examples.edge_collapse:edge_collapse")
+    solution = agent.solve(more)
+    assert solution.sequence.steps == agent.solve(game()).sequence.steps
+    assert solution.sequence.settings["operators"].endswith(",edge_collapse")
+
+
+def test_policy_that_knows_none_of_the_operators__is_refused_with_both_named(weights: str) -> None:
+    agent = make_agent("maskable-ppo", weights=weights)
+    with pytest.raises(ConfigError, match=r"maskable-ppo was trained with operators full and knows none of edge_coll"):
+        agent.solve(game(operators="examples.edge_collapse:edge_collapse"))
 
 
 def test_a_mesh_that_does_not_fit__is_refused_with_both_numbers(weights: str) -> None:

@@ -78,9 +78,9 @@ def actions_in(new: PolyMesh, new_vertex: np.ndarray, new_face: np.ndarray, old_
     start = 1
     for name in RULES.operators:
         kind = OPERATORS[name].element
-        for before, after in enumerate(moved[kind]):
+        for before, after in enumerate(moved[kind.name]):
             order[start + int(after)] = start + before
-        start += CODEC.capacity[kind]
+        start += kind.per_vertex * CODEC.max_vertices
     return order
 
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from autopoly_env.compute import set_threads
 from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.mesh import PolyMesh, defects_of, is_valid
-from autopoly_env.operators import OPERATORS, STOP, Action, n_elements
+from autopoly_env.operators import OPERATORS, STOP, Action
 from autopoly_env.refit import LOCAL, refit
 from autopoly_env.score import ScoreWeights, score
 from autopoly_env.sequence import ConstructionSequence
@@ -374,7 +374,7 @@ def test_random_play__never_does_worse_than_the_operators(target: int, seed: int
     game = Simulator(noise(target, 32), resolution=32, operators=operators)
     for before, after in played(game, seed, 12):
         action = after.action
-        assert action is not None and 0 <= action.element < n_elements(before.mesh, OPERATORS[action.operator].element)
+        assert action is not None and 0 <= action.element < OPERATORS[action.operator].element.count(before.mesh)
         made = OPERATORS[action.operator].apply(before.mesh, action.element, after.choice)
         assert made.with_vertices(after.mesh.vertices) == after.mesh
         assert all(np.less_equal(defects_of(after.mesh), defects_of(made)))

@@ -16,7 +16,6 @@ from autopoly_env.mesh import PolyMesh, is_sane
 from autopoly_env.operators import OPERATORS, Action
 from autopoly_env.score import Score
 from autopoly_env.sequence import ConstructionSequence
-from autopoly_env.sequence.ids import element_index
 from autopoly_env.simulator import Simulator, State
 from tests.drawings import HOUSE, SQUARE, noise, painted
 from tests.sequences import SCORE, gabled, played, walked
@@ -34,7 +33,7 @@ def told(*steps: tuple[str, dict[str, Any], Places]) -> ConstructionSequence:
     """A construction from the quad: operator, element by ids, and where vertices go after it."""
     mesh, transitions = QUAD, []
     for name, ids, places in steps:
-        element = element_index(mesh, OPERATORS[name].element, ids)
+        element = OPERATORS[name].element.index(mesh, ids)
         made = OPERATORS[name].apply(mesh, element)
         vertices = made.vertices.copy()
         for vertex, place in places.items():

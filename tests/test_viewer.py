@@ -162,7 +162,7 @@ def test_operators_doc__has_the_registry_in_its_table() -> None:
         triples = tuple(tuple(numbers[i : i + 3]) for i in range(0, len(numbers), 3))
         stated.append((name.strip("`"), element, effect, triples, re.findall(r"`(\w+)`", presets)))
     assert stated == [
-        (o.name, o.element, o.effect, o.changes, [name for name, operators in PRESETS.items() if o in operators])
+        (o.name, o.element.name, o.effect, o.changes, [name for name, operators in PRESETS.items() if o in operators])
         for o in OPERATORS.values()
     ]
 

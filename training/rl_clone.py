@@ -33,7 +33,7 @@ from agents.rl.weights import save_policy
 from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.files import write_atomically
 from autopoly_env.observation import PADDING, Observation
-from autopoly_env.operators import OPERATORS, Action, ActionCodec
+from autopoly_env.operators import Action, ActionCodec, operator_named
 from training.networks.metrics import mean_rows
 from training.networks.samples import Batch, HeldOut, LabelConfig, Sample, Stored, stored
 from training.networks.trainer import OptimConfig, RunConfig, place_of, train
@@ -156,7 +156,7 @@ def _mirrored(codec: ActionCodec, seen: Observation) -> np.ndarray:
     order = np.arange(codec.n_actions)
     swap = _reversed_corners(seen["faces"])
     for name in codec.operators:
-        if OPERATORS[name].element == "corner":
+        if operator_named(name).element.base == "corner":
             start = codec.encode(Action(name, 0))
             order[start : start + len(swap)] = start + swap
     return order

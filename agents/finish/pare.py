@@ -3,10 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from agents.finish.tidy import REMOVING
 from autopoly_env.errors import IllegalActionError
 from autopoly_env.mesh import is_sane
-from autopoly_env.operators import OPERATORS, STOP, Action
+from autopoly_env.operators import STOP, Action, operator_named
 from autopoly_env.simulator import Simulator, State
 
 _N_TRIED = 4  # removals that are refitted, those that are worth most as they are
@@ -37,10 +36,10 @@ def _most_promising(simulator: Simulator, state: State) -> list[Action]:
 
     def worth(action: Action) -> float:
         try:
-            after = OPERATORS[action.operator].apply(state.mesh, action.element)
+            after = operator_named(action.operator).apply(state.mesh, action.element)
         except IllegalActionError:
             return float("-inf")
         return simulator.score(after).total
 
-    actions = [action for action in simulator.legal_actions(state) if action.operator in REMOVING]
+    actions = [action for action in simulator.legal_actions(state)[1:] if operator_named(action.operator).removes]
     return sorted(actions, key=worth, reverse=True)[:_N_TRIED]

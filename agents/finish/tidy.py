@@ -7,16 +7,18 @@ sane meshes only. What they moved on the way moves with the step before or after
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from autopoly_env.errors import AutoPolyError
 from autopoly_env.mesh import PolyMesh, is_sane
-from autopoly_env.operators import OPERATORS, Action, Choice
+from autopoly_env.operators import Action, Choice, Operator, operator_named
+from autopoly_env.operators.choices import Renaming
 from autopoly_env.score import Score
 from autopoly_env.sequence import ConstructionSequence, Step
-from autopoly_env.sequence.ids import choice_indices, element_index
+from autopoly_env.sequence.ids import choice_indices
+from autopoly_env.sequence.variation import stay
 
 _MOST_LOST = 0.1  # of the IoU of a mesh on the way
-REMOVING = ("vertex_dissolve", "edge_dissolve", "face_delete")
 
 Taken = tuple[Action, Choice | None, PolyMesh]  # an action, its choice and the mesh after it
 Faces = set[tuple[int, ...]]
@@ -46,13 +48,13 @@ def tidy(sequence: ConstructionSequence, scored: Callable[[PolyMesh], Score]) ->
 def _detours(sequence: ConstructionSequence, meshes: Sequence[PolyMesh], j: int) -> Iterator[frozenset[int]]:
     """Sets of steps, from 0, that may undo each other: step j, if it removes, and those that made what it removes."""
     step = sequence.steps[j]
-    if step.operator not in REMOVING:
+    if not operator_named(step.operator).removes:
         return
     match step.element:
         case {"edge": [a, b]}:
             makers = [i for i in range(j) if _has_edge(meshes[i + 1], a, b) and not _has_edge(meshes[i], a, b)][-1:]
         case _:
-            kinds = ("vertices", "faces") if step.operator == "face_delete" else ("vertices",)
+            kinds = ("vertices", "faces") if "face" in step.element else ("vertices",)
             gone = {(kind, name) for kind in kinds for name in step.removed[kind]}
             made = [{(kind, name) for kind in kinds for name in s.created[kind]} for s in sequence.steps[:j]]
             makers = [i for i in range(j) if not gone.isdisjoint(made[i])]
@@ -111,9 +113,9 @@ class _Retold:
 
         Raises AutoPolyError where that cannot be done, or leaves a mesh that is not sane.
         """
-        operator = OPERATORS[step.operator]
-        element = element_index(self.mesh, operator.element, self._element(step, before))
-        choice = choice_indices(self.mesh, operator, element, self._choice(step))
+        operator = operator_named(step.operator)
+        element = operator.element.index(self.mesh, self._element(step, before))
+        choice = choice_indices(self.mesh, operator, element, self._choice(operator, step))
         made = operator.apply(self.mesh, element, choice)
         created = [name for name in made.vertex_ids if name >= self.mesh.next_vertex_id]
         self.names |= dict(zip(step.created["vertices"], created, strict=True))
@@ -147,10 +149,10 @@ class _Retold:
             element["vertex"] = self._name(element["vertex"])
         return element
 
-    def _choice(self, step: Step) -> dict[str, object] | None:
-        if step.choice is None or "to" in step.choice:
-            return step.choice and {"to": self._name(step.choice["to"])}
-        return {**step.choice, "bridges": [[self._name(v), corner] for v, corner in step.choice["bridges"]]}
+    def _choice(self, operator: Operator, step: Step) -> dict[str, Any] | None:
+        if step.choice is None or operator.choice is None:
+            return step.choice
+        return operator.choice.renamed(step.choice, Renaming(self._name, stay))
 
     def _name(self, old: object) -> int:
         if not isinstance(old, int) or old not in self.names:

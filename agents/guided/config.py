@@ -8,33 +8,35 @@ from typing import Literal
 
 from agents.search.config import MctsConfig
 from autopoly_env.errors import ConfigError
-from autopoly_env.operators import HOLE_SIDES, OPERATORS, STOP, Action
+from autopoly_env.operators import STOP, Action, operator_named
 
 Input = Literal["current", "target", "difference", "edges", "vertices"]
 Regions = Literal["one", "each"]
 
-# What the action head tells apart: stopping, and every operator; a hole of 3 and one of 4 corners are two.
+# What an action head tells apart: stopping, and what the operators do (`Operator.classes`). Weights name their own
+# classes; these are those of weights that do not, and what training begins with.
 CLASSES = (
     "stop",
-    *(
-        name
-        for operator in OPERATORS.values()
-        for name in (
-            [f"{operator.name}_{sides}" for sides in HOLE_SIDES] if operator.element == "hole" else [operator.name]
-        )
-    ),
+    "edge_subdivide",
+    "edge_extrude",
+    "face_split",
+    "face_delete",
+    "face_hole_3",
+    "face_hole_4",
+    "vertex_dissolve",
+    "edge_dissolve",
 )
-_CLASS_OF_NAME = {name: k for k, name in enumerate(CLASSES)}
 STOP_CLASS = 0
+UNKNOWN = -1
 
 
-def class_of(action: Action) -> int:
-    """The index in CLASSES of what an action does."""
+def class_of(action: Action, classes: tuple[str, ...] = CLASSES) -> int:
+    """The index in `classes` of what an action does; UNKNOWN where it is not among them."""
     if action == STOP:
         return STOP_CLASS
-    if OPERATORS[action.operator].element == "hole":
-        return _CLASS_OF_NAME[f"{action.operator}_{HOLE_SIDES[action.element % len(HOLE_SIDES)]}"]
-    return _CLASS_OF_NAME[action.operator]
+    operator = operator_named(action.operator)
+    name = operator.classes[action.element % operator.element.n_each]
+    return classes.index(name) if name in classes else UNKNOWN
 
 
 def _check_network(size: int, widths: tuple[int, ...], feature: int) -> None:
@@ -59,8 +61,11 @@ class NfapConfig:
     regions: Regions = "one"  # action-region images a stage: one, or one for each operator class
     residual: bool = False  # the prior is a learned correction of the residual prior, not the networks' alone
     judge: bool = False  # a head looks at each action's own place and measures, and corrects what the regions say
+    classes: tuple[str, ...] = CLASSES  # of actions, by name; "stop" first
 
     def __post_init__(self) -> None:
+        if self.classes[:1] != ("stop",) or len(set(self.classes)) < len(self.classes):
+            raise ConfigError(f"classes {', '.join(self.classes)}: expected stop first, and none twice")
         _check_network(self.image_size, self.widths, self.feature)
         if not 1 <= self.n <= 16:
             raise ConfigError(f"n {self.n}: expected 1 to 16 stages")

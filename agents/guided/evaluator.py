@@ -24,8 +24,8 @@ from agents.search.evaluator import ResidualEvaluator
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import IllegalActionError
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import OPERATORS, Action, Choice
-from autopoly_env.placement import Disagreement, starts
+from autopoly_env.operators import Action, Choice, operator_named
+from autopoly_env.placement import Disagreement, tried
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator, State
 
@@ -49,14 +49,18 @@ class NfapEvaluator:
 
     def prior(self, simulator: Simulator, state: State, actions: Sequence[Action]) -> FloatArray:
         disagreement = Disagreement(state.mesh, simulator.silhouette)
-        arrays = candidate_arrays(disagreement, actions)
+        arrays = candidate_arrays(disagreement, actions, self._net.config.classes)
         arrays["log_residual"] = np.log(self._residual.prior_by(disagreement, actions)).astype(np.float32)
         candidates = candidates_of({name: torch.from_numpy(array)[None] for name, array in arrays.items()})
         with torch.inference_mode():
             logits = self._net.choose(self._first_stage(simulator, state), candidates)
+        is_known = arrays["classes"] >= 0
+        if not is_known.any():
+            return self._residual.prior_by(disagreement, actions)
         corrected = logits[0].double().numpy() - self._extra_price(simulator, actions)
         odds = np.exp((corrected - corrected.max()) / self._temperature)
         odds += _FLOOR
+        odds[~is_known] = 0.0
         normalised: FloatArray = odds / odds.sum()
         return normalised
 
@@ -139,9 +143,10 @@ class WarpEvaluator(NfapEvaluator):
         for action in actions:
             try:
                 if self._placed:
-                    yield action, *starts(disagreement, action)[0]
+                    start = tried(disagreement, action).starts[0]
+                    yield action, start.choice, start.mesh
                 else:
-                    operator = OPERATORS[action.operator]
+                    operator = operator_named(action.operator)
                     choice = operator.choose(state.mesh, action.element)
                     yield action, choice, operator.apply(state.mesh, action.element, choice)
             except IllegalActionError:
@@ -179,5 +184,5 @@ def _better(
 
 
 def _changes(action: Action) -> tuple[int, int, int]:
-    changes = OPERATORS[action.operator].changes
+    changes = operator_named(action.operator).changes
     return changes[action.element % len(changes)]

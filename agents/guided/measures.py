@@ -13,21 +13,23 @@ from agents.guided.config import class_of
 from agents.guided.regions import N_POINTS, action_points
 from autopoly_env.arrays import FloatArray
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import HOLE_SIDES, OPERATORS, Action
+from autopoly_env.operators import Action, operator_named
 from autopoly_env.placement import Disagreement
-from autopoly_env.placement.blame_kernels import AREA, DEPTH, MASS
+from autopoly_env.placement.blame_kernels import DEPTH, MASS
 
 N_MEASURES = 9
 _ALONG = (np.arange(N_POINTS) + 0.5)[:, None] / N_POINTS
 
 
-def candidate_arrays(disagreement: Disagreement, actions: Sequence[Action]) -> dict[str, NDArray[Any]]:
+def candidate_arrays(
+    disagreement: Disagreement, actions: Sequence[Action], classes: tuple[str, ...]
+) -> dict[str, NDArray[Any]]:
     """What nFAP-Net reads about the legal actions, the residual prior left out: `agents.guided.nfap.Candidates`."""
     mesh = disagreement.mesh
     points = action_points(mesh, actions)
     return {
         "points": points.astype(np.float32),
-        "classes": np.array([class_of(action) for action in actions], np.int64),
+        "classes": np.array([class_of(action, classes) for action in actions], np.int64),
         "spots": action_spots(mesh, actions, points).astype(np.float32),
         "measures": action_measures(disagreement, actions).astype(np.float32),
     }
@@ -38,7 +40,7 @@ def action_spots(mesh: PolyMesh, actions: Sequence[Action], points: FloatArray) 
     spots = points.copy()
     around = _around(mesh)
     for row, action in enumerate(actions):
-        if OPERATORS[action.operator].element == "vertex" and action.element in around:
+        if operator_named(action.operator).element.base == "vertex" and action.element in around:
             first, last = mesh.vertices[list(around[action.element])]
             spots[row] = first + _ALONG * (last - first)
     return spots
@@ -69,25 +71,25 @@ def _measured(
     disagreement: Disagreement, sides: FloatArray, around: dict[int, tuple[int, int]], action: Action
 ) -> list[float]:
     """The measures of one action's own element."""
-    mesh, kind, element = disagreement.mesh, OPERATORS[action.operator].element, action.element
+    kind = operator_named(action.operator).element
+    mesh, base, element = disagreement.mesh, kind.base, kind.place(action.element)
     length = spanned = excess = 0.0
     blame = np.zeros((2, 2))
-    if kind == "edge":
+    if base == "edge":
         a, b = mesh.vertices[mesh.edges[element]]
         length = float(np.hypot(*(b - a)))
         row = disagreement.row_of_edge.get(element, -1)
         blame = sides[row] if row >= 0 else blame
-    elif kind == "vertex" and element in around:
+    elif base == "vertex" and element in around:
         before, after = around[element]
         u, v = mesh.vertices[element] - mesh.vertices[before], mesh.vertices[after] - mesh.vertices[element]
         length, area = float(np.hypot(*(u + v))), 0.5 * float(u[0] * v[1] - u[1] * v[0])
         spanned = float(np.copysign(np.sqrt(abs(area)), area))
         at = [disagreement.row_of_edge[mesh.edge_index(*ends)] for ends in ((before, element), (element, after))]
         blame = np.column_stack((sides[at, :, 0].sum(axis=0), sides[at, :, 1].max(axis=0)))
-    elif kind in ("face", "hole"):
-        face = element // len(HOLE_SIDES) if kind == "hole" else element
-        length = float(np.sqrt(max(mesh.face_areas()[face], 0.0)))
-        region = disagreement.excess_in(face)
-        excess = 0.0 if region is None else float(np.sqrt(-region[AREA]))
+    elif base == "face":
+        length = float(np.sqrt(max(mesh.face_areas()[element], 0.0)))
+        region = disagreement.excess_in(element)
+        excess = 0.0 if region is None else float(np.sqrt(-region.area))
     (missing, missing_depth), (too_much, too_much_depth) = blame
     return [length, missing**0.5, missing_depth, too_much**0.5, too_much_depth, spanned, excess]

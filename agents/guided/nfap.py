@@ -11,7 +11,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from agents.guided.config import CLASSES, NfapConfig
+from agents.guided.config import NfapConfig
 from agents.guided.layers import Decoder, Encoder
 from agents.guided.measures import N_MEASURES
 
@@ -39,7 +39,7 @@ class Foresight:
 
 @dataclass(frozen=True)
 class Candidates:
-    """The legal actions of a batch of states; rows whose class is -1 are padding."""
+    """The legal actions of a batch of states; rows whose class is -1 are padding, or of an unknown operator."""
 
     points: Tensor  # (B, A, P, 2) where to read the regions, unit square
     classes: Tensor  # (B, A)
@@ -55,11 +55,11 @@ class _Judge(nn.Module):
     does not matter), the action's class and measures, the residual prior, and the feature of the whole.
     """
 
-    def __init__(self, n_maps: int, feature: int, width: int = 48) -> None:
+    def __init__(self, n_maps: int, feature: int, n_classes: int, width: int = 48) -> None:
         super().__init__()
         self.place = nn.Linear(n_maps, width)
         self.whole = nn.Linear(feature, width)
-        self.kind = nn.Embedding(len(CLASSES), width)
+        self.kind = nn.Embedding(n_classes, width)
         self.first = nn.Linear(4 * width + N_MEASURES + 1, 2 * width)
         self.second = nn.Linear(2 * width, width)
         self.last = nn.Linear(width, 1)
@@ -87,16 +87,17 @@ class NfapNet(nn.Module):
         super().__init__()
         self.config = config
         size, widths, feature = config.image_size, config.widths, config.feature
+        n_classes = len(config.classes)
         self.encoder = Encoder(len(config.inputs), widths, feature, size)
         self.memory = nn.LSTMCell(feature, feature)
         self.image_decoder = Decoder(1, widths, feature, size, config.skips)
-        n_regions = 1 if config.regions == "one" else len(CLASSES)
+        n_regions = 1 if config.regions == "one" else n_classes
         self.region_decoder = Decoder(n_regions, widths, feature, size, config.skips)
-        self.action_head = nn.Sequential(nn.Linear(feature, feature), nn.ReLU(), nn.Linear(feature, len(CLASSES)))
-        self.region_weight = nn.Parameter(torch.ones(len(CLASSES)))
+        self.action_head = nn.Sequential(nn.Linear(feature, feature), nn.ReLU(), nn.Linear(feature, n_classes))
+        self.region_weight = nn.Parameter(torch.ones(n_classes))
         self.residual_weight = nn.Parameter(torch.ones(())) if config.residual else None
         self.region_decoder.begin_with(_RARE)
-        self.judge = _Judge(self.region_decoder.n_last, feature) if config.judge else None
+        self.judge = _Judge(self.region_decoder.n_last, feature, n_classes) if config.judge else None
 
     def forward(self, pictures: Tensor, n_stages: int | None = None, with_images: bool = True) -> Foresight:
         """Foresee `n_stages` (by default n) from pictures (B, C, S, S)."""
@@ -135,7 +136,7 @@ class NfapNet(nn.Module):
         """
         real = classes >= 0
         index = classes.clamp(min=0)
-        n_alike = functional.one_hot(index, len(CLASSES)).mul(real[..., None]).sum(1)
+        n_alike = functional.one_hot(index, len(self.config.classes)).mul(real[..., None]).sum(1)
         share = operators.float().log_softmax(-1) - n_alike.clamp(min=1).float().log()
         read = read_at(regions.float().clamp(-_MAX_LOG_ODDS, _MAX_LOG_ODDS), points)
         own = read[:, 0] if regions.shape[1] == 1 else read.gather(1, index[:, None]).squeeze(1)

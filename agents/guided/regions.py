@@ -13,7 +13,7 @@ import numpy as np
 from agents.guided.pictures import Picture
 from autopoly_env.arrays import FloatArray
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import HOLE_SIDES, OPERATORS, Action
+from autopoly_env.operators import STOP, Action, operator_named
 from autopoly_env.raster import Batch, coverage_of_batch
 
 N_POINTS = 8
@@ -28,14 +28,13 @@ def action_points(mesh: PolyMesh, actions: Sequence[Action]) -> FloatArray:
     points = np.empty((len(actions), N_POINTS, 2))
     of_face: dict[int, FloatArray] = {}
     for row, action in enumerate(actions):
-        kind, element = OPERATORS[action.operator].element, action.element
-        if kind in ("face", "hole"):
-            face = element // len(HOLE_SIDES) if kind == "hole" else element
-            if face not in of_face:
-                of_face[face] = _face_points(mesh, face)
-            points[row] = of_face[face]
+        base, element = _place(action)
+        if base == "face":
+            if element not in of_face:
+                of_face[element] = _face_points(mesh, element)
+            points[row] = of_face[element]
         else:
-            first, last = _segment(mesh, kind, element)
+            first, last = _segment(mesh, base, element)
             points[row] = first + _ALONG * (last - first)
     return points
 
@@ -45,22 +44,27 @@ def region_image(mesh: PolyMesh, action: Action, size: int) -> Picture:
 
     All 0 for STOP, which works nowhere.
     """
-    kind = OPERATORS[action.operator].element if action.operator in OPERATORS else ""
-    if not kind:
+    if action == STOP:
         return np.zeros((size, size), np.float32)
-    if kind in ("face", "hole"):
-        face = action.element // len(HOLE_SIDES) if kind == "hole" else action.element
-        return _face_coverage(mesh.vertices[list(mesh.faces[face])], size)
-    first, last = _segment(mesh, kind, action.element)
+    base, element = _place(action)
+    if base == "face":
+        return _face_coverage(mesh.vertices[list(mesh.faces[element])], size)
+    first, last = _segment(mesh, base, element)
     return _band(first, last, size)
 
 
-def _segment(mesh: PolyMesh, kind: str, element: int) -> tuple[FloatArray, FloatArray]:
+def _place(action: Action) -> tuple[str, int]:
+    """What an action's element lies at, of the mesh's own: "vertex", "edge", "face" or "corner", and its index."""
+    kind = operator_named(action.operator).element
+    return kind.base, kind.place(action.element)
+
+
+def _segment(mesh: PolyMesh, base: str, element: int) -> tuple[FloatArray, FloatArray]:
     """The ends of the straight line that stands for an edge, vertex or corner."""
-    if kind == "edge":
+    if base == "edge":
         first, last = mesh.vertices[mesh.edges[element]]
         return first, last
-    if kind == "vertex":
+    if base == "vertex":
         return mesh.vertices[element], mesh.vertices[element]
     links = mesh.topology.links
     corner = mesh.vertices[links.tails[element]]

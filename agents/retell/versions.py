@@ -9,7 +9,7 @@ import numpy as np
 from autopoly_env.errors import AutoPolyError
 from autopoly_env.mesh import PolyMesh, is_sane
 from autopoly_env.operators import HOLE_SIDES, OPERATORS, Action
-from autopoly_env.placement import Disagreement, starts
+from autopoly_env.placement import Disagreement, tried
 from autopoly_env.score import Score
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence.deformation import ThinPlate
@@ -138,7 +138,7 @@ def _longer(simulator: Simulator, version: Version) -> Iterator[Version]:
         if action.operator not in simulator.operators:
             continue
         try:
-            choice, mesh = starts(disagreement, action)[0]
+            choice, mesh, _ = tried(disagreement, action).starts[0]
         except AutoPolyError:
             continue
         yield version_of(

@@ -10,6 +10,16 @@ from agents.search.config import MctsConfig
 from autopoly_env.errors import ConfigError
 from autopoly_env.operators import preset
 
+# What policies are trained with by default: frozen, so that weights and observations stay what they are.
+OPERATORS = (
+    "edge_subdivide",
+    "edge_extrude",
+    "face_split",
+    "face_delete",
+    "face_hole",
+    "vertex_dissolve",
+    "edge_dissolve",
+)
 ALGORITHMS = ("maskable_ppo", "ppo", "a2c", "dqn")
 
 
@@ -30,13 +40,13 @@ class NetConfig:
 class Rules:
     """What a policy was made for: where it plays these must be the same."""
 
-    operators: tuple[str, ...] = tuple(operator.name for operator in preset("full"))
+    operators: tuple[str, ...] = OPERATORS
     max_vertices: int = 48  # N
     obs_resolution: int = 64  # R
     max_steps: int = 24  # of a construction; after them it stops
 
     def __post_init__(self) -> None:
-        preset(",".join(self.operators))
+        preset(self.operators)
         if self.max_vertices < 4 or self.max_steps < 1:
             raise ConfigError(f"{self}: expected max_vertices of at least 4 and max_steps of at least 1")
         if self.obs_resolution % 16 or not 16 <= self.obs_resolution <= 256:
@@ -52,11 +62,11 @@ class Rules:
                 raise ConfigError(f"{theirs}: {name} {_shown(found)}; {ours}: {name} {_shown(value)}: make them agree")
 
     def check_operators(self, operators: tuple[str, ...], who: str) -> None:
-        """Raise ConfigError, which names both, unless these are the operators of the policy, in any order."""
-        if set(operators) != set(self.operators):
+        """Raise ConfigError, which names both, unless the policy knows some of these operators; others are masked."""
+        if not set(operators) & set(self.operators):
             raise ConfigError(
-                f"{who} was trained with operators {_shown(self.operators)} and is asked to play with "
-                f"{_shown(operators)}: give operators={_shown(self.operators)} or other weights"
+                f"{who} was trained with operators {_shown(self.operators)} and knows none of {_shown(operators)}: "
+                f"give operators={_shown(self.operators)} or other weights"
             )
 
 

@@ -21,7 +21,7 @@ from agents.rl import reading
 from agents.rl.config import NetConfig, Rules
 from agents.rl.links import Links, averaged, links_of, summed, taken
 from autopoly_env.observation import Observer
-from autopoly_env.operators import HOLE_SIDES, OPERATORS, Action, ActionCodec
+from autopoly_env.operators import Action, ActionCodec, operator_named
 
 NEVER = -1e8  # logit of what is not legal
 N_FACTS = 10  # numbers about the whole, beside the pictures
@@ -144,14 +144,14 @@ class PointerHead(nn.Module):
         super().__init__()
         codec = ActionCodec(rules.operators, rules.max_vertices)
         self.n_actions = codec.n_actions
-        self._places: dict[
-            str, list[tuple[int, int]]
-        ] = {}  # by kind: of each output, the action of element 0, the step
+        # by kind of element: of each output the number of the first element's action, and the step to the next's
+        self._places: dict[str, list[tuple[int, int]]] = {}
+        self._bases: dict[str, str] = {}  # by kind: the elements of the mesh that it lies at
         for name in rules.operators:
-            kind = OPERATORS[name].element
+            kind = operator_named(name).element
             start = codec.encode(Action(name, 0))
-            n_each = len(HOLE_SIDES) if kind == "hole" else 1
-            self._places.setdefault(kind, []).extend((start + k, n_each) for k in range(n_each))
+            self._places.setdefault(kind.name, []).extend((start + k, kind.n_each) for k in range(kind.n_each))
+            self._bases[kind.name] = kind.base
         width = config.width
         self.elements = nn.ModuleDict({kind: nn.Linear(width, width) for kind in self._places})
         self.whole = nn.ModuleDict({kind: nn.Linear(width, width, bias=False) for kind in self._places})
@@ -162,7 +162,7 @@ class PointerHead(nn.Module):
         whole = encoded.whole
         values, index = [self.stop(whole)[:, 0]], [torch.arange(len(whole), device=whole.device) * self.n_actions]
         for kind, places in self._places.items():
-            rows, batch, number = encoded.elements["face" if kind == "hole" else kind]
+            rows, batch, number = encoded.elements[self._bases[kind]]
             hidden = self.elements[kind](rows) + taken(self.whole[kind](whole), batch)
             said = self.logits[kind](functional.relu(hidden))
             for column, (start, n_each) in enumerate(places):

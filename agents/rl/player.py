@@ -38,8 +38,8 @@ class Player:
     def observe(self, simulator: Simulator, state: State) -> Observation:
         """What the policy sees of a state.
 
-        Raises ConfigError for other operators than it was trained with, and for a mesh that its padding has no room
-        for.
+        Raises ConfigError where it knows none of the simulator's operators, and for a mesh that its padding has no
+        room for.
         """
         self.rules.check_operators(simulator.operators, self.who)
         self.check_fits(state)
@@ -57,6 +57,8 @@ class Player:
     def legal_mask(self, simulator: Simulator, state: State) -> BoolArray:
         """(G,) what may be done: what the codec has room for and the simulator, with its guidance, allows."""
         mask = self.codec.legal_mask(state.mesh)
+        for unknown in set(self.rules.operators).difference(simulator.operators):
+            mask[self.codec.indices_of(unknown)] = False
         if simulator.guidance.names:
             allowed = np.zeros_like(mask)
             allowed[[0, *self._indices(simulator.legal_actions(state))]] = True

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from autopoly_env.errors import ConfigError, IllegalActionError, MeshError
-from autopoly_env.guidance.symmetry import best_axis, images_of
-from autopoly_env.mesh import PolyMesh, canonical_hash, defects_of, validate
+from autopoly_env.guidance.symmetry import best_axis
+from autopoly_env.mesh import PolyMesh, canonical_hash, defects_of, images_of, validate
 from autopoly_env.operators import OPERATORS, Action, describe
 from autopoly_env.refit import Bonds
 from autopoly_env.sequence import ConstructionSequence

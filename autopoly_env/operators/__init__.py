@@ -1,24 +1,44 @@
-"""The topological operators, the actions that apply them, and how actions are numbered."""
+"""The topological operators, a file each; the actions that apply them, and how actions are numbered."""
 
-from autopoly_env.operators.actions import CAPACITY_PER_VERTEX, STOP, Action, ActionCodec, describe, legal_actions
-from autopoly_env.operators.edits import HOLE_SIDES, Choice
+from autopoly_env.operators.action import STOP, Action, Choice, Halfway, Start
+from autopoly_env.operators.codec import ActionCodec, describe, legal_actions
+from autopoly_env.operators.elements import (
+    CAPACITY_PER_VERTEX,
+    CORNER,
+    EDGE,
+    FACE,
+    HOLE,
+    HOLE_SIDES,
+    VERTEX,
+    ElementKind,
+)
 from autopoly_env.operators.holes import HoleChoice, plan_hole
-from autopoly_env.operators.registry import OPERATORS, PRESETS, Operator, n_elements, preset
+from autopoly_env.operators.operator import Operator
+from autopoly_env.operators.registry import OPERATORS, PRESETS, operator_named, preset, register
 
 __all__ = [
     "CAPACITY_PER_VERTEX",
+    "CORNER",
+    "EDGE",
+    "FACE",
+    "HOLE",
     "HOLE_SIDES",
     "OPERATORS",
     "PRESETS",
     "STOP",
+    "VERTEX",
     "Action",
     "ActionCodec",
     "Choice",
+    "ElementKind",
+    "Halfway",
     "HoleChoice",
     "Operator",
+    "Start",
     "describe",
     "legal_actions",
-    "n_elements",
+    "operator_named",
     "plan_hole",
     "preset",
+    "register",
 ]

@@ -1,144 +1,94 @@
-"""The registry of topological operators: their names, elements, effects on (V, E, F), and presets.
+"""The registry of topological operators, and the presets; names and effects are those of Blender's operators."""
 
-An operator works on one element: the index of an edge, face, corner (= half-edge), vertex or hole (2 * face +
-sides - 3) of the current mesh. New vertices and faces come last, with new ids; the others keep their order
-and ids. Names and effects are those of Blender's operators (`subdivide_edges`, `extrude_edge_only`,
-`face_split`, `delete`, `dissolve_*`).
-"""
+from collections.abc import Iterable
+from importlib import import_module
 
-from collections.abc import Callable
-from dataclasses import dataclass
-
-from autopoly_env.arrays import BoolArray
 from autopoly_env.errors import ConfigError
-from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import edits
-from autopoly_env.operators.edits import Choice
-from autopoly_env.operators.holes import HoleChoice, plan_hole
-
-__all__ = ["OPERATORS", "PRESETS", "Choice", "HoleChoice", "Operator", "n_elements", "plan_hole", "preset"]
-
-
-def _nothing_to_choose(_mesh: PolyMesh, _element: int) -> None:
-    return None
-
-
-@dataclass(frozen=True)
-class Operator:
-    """One topological operator."""
-
-    name: str
-    element: str  # edge, face, corner, vertex or hole
-    effect: str  # in words
-    changes: tuple[tuple[int, int, int], ...]  # of (V, E, F), at most; element e has changes[e % len(changes)]
-    legal_mask: Callable[[PolyMesh], BoolArray]  # (n_elements,) where `apply` works
-    edit: Callable[[PolyMesh, int, Choice | None], PolyMesh]  # what `apply` calls
-    choose: Callable[[PolyMesh, int], Choice | None] = _nothing_to_choose  # what `apply` chooses by default
-
-    def apply(self, mesh: PolyMesh, element: int, choice: Choice | None = None) -> PolyMesh:
-        """The mesh after the operator has worked on `element`, with `choice` or what `choose` gives.
-
-        `face_split` has the corner to split to as its choice, `face_hole` a `HoleChoice`, the others none.
-        Raises IllegalActionError if the element or the choice does not allow it.
-        """
-        n = n_elements(mesh, self.element)
-        if not 0 <= element < n:
-            raise edits.refusal(self.name, self.element, element, f"the mesh has {n}; give 0..{n - 1}")
-        return self.edit(mesh, int(element), self.choose(mesh, int(element)) if choice is None else choice)
-
-
-def n_elements(mesh: PolyMesh, kind: str) -> int:
-    """How many elements of a kind (edge, face, corner, vertex, hole) the mesh has."""
-    match kind:
-        case "edge":
-            return mesh.topology.n_edges
-        case "face":
-            return len(mesh.face_ids)
-        case "corner":
-            return len(mesh.topology.links.tails)
-        case "vertex":
-            return len(mesh.vertex_ids)
-        case "hole":
-            return len(edits.HOLE_SIDES) * len(mesh.face_ids)
-    raise ConfigError(f"element kind {kind!r} is unknown; give edge, face, corner, vertex or hole")
-
-
-edge_subdivide = Operator(
-    "edge_subdivide",
-    "edge",
-    "a new vertex at the middle of an edge",
-    ((1, 1, 0),),
-    edits.any_edge,
-    edits.subdivide_edge,
-)
-edge_extrude = Operator(
-    "edge_extrude",
-    "edge",
-    "a new quad on a boundary edge",
-    ((2, 3, 1),),
-    edits.boundary_edges,
-    edits.extrude_edge,
-)
-face_split = Operator(
-    "face_split",
-    "corner",
-    "a face cut in two along an inner diagonal from a corner",
-    ((0, 1, 1),),
-    edits.corners_with_diagonal,
-    edits.split_face,
-    edits.most_even_diagonal,
-)
-face_delete = Operator(
-    "face_delete",
-    "face",
-    "a face removed, with the edges and vertices that have no other",
-    ((0, 0, -1),),
-    edits.any_face_but_the_last,
-    edits.delete_face,
-)
-face_hole = Operator(
-    "face_hole",
-    "hole",
-    "a hole of 3 or 4 corners cut into a face with two bridges",
-    ((3, 5, 1), (4, 6, 1)),
-    edits.faces_with_room,
-    edits.cut_hole,
-    edits.regular_hole,
-)
-vertex_dissolve = Operator(
-    "vertex_dissolve",
-    "vertex",
-    "a boundary vertex of valence 2 removed, its two edges made one",
-    ((-1, -1, 0),),
-    edits.dissolvable_vertices,
-    edits.dissolve_vertex,
-)
-edge_dissolve = Operator(
-    "edge_dissolve",
-    "edge",
-    "the edge between two faces removed, the faces made one",
-    ((0, -1, -1),),
-    edits.dissolvable_edges,
-    edits.dissolve_edge,
-)
+from autopoly_env.operators.edge_dissolve import edge_dissolve
+from autopoly_env.operators.edge_extrude import edge_extrude
+from autopoly_env.operators.edge_subdivide import edge_subdivide
+from autopoly_env.operators.face_delete import face_delete
+from autopoly_env.operators.face_hole import face_hole
+from autopoly_env.operators.face_split import face_split
+from autopoly_env.operators.operator import Operator
+from autopoly_env.operators.vertex_dissolve import vertex_dissolve
 
 _PAPER = (edge_subdivide, edge_extrude, face_split, face_delete)
 _FULL = (*_PAPER, face_hole, vertex_dissolve, edge_dissolve)
-OPERATORS: dict[str, Operator] = {operator.name: operator for operator in _FULL}
 PRESETS: dict[str, tuple[Operator, ...]] = {"paper": _PAPER, "full": _FULL}
+OPERATORS: dict[str, Operator] = {operator.name: operator for operator in _FULL}  # all that this process knows
 
 
-def preset(name: str) -> tuple[Operator, ...]:
-    """The operators of a preset ("paper", "full") or of a comma list of operator names, in that order.
+def register(operator: Operator) -> Operator:
+    """Make an operator known by its name to everything in this process; returns it.
 
-    Raises ConfigError for a name that is neither, or an operator named twice.
+    Raises ConfigError for a name that another operator has, or that is no word.
     """
-    if name in PRESETS:
-        return PRESETS[name]
-    names = [part.strip() for part in name.split(",")]
-    if not set(names) <= OPERATORS.keys() or len(set(names)) < len(names):
+    if not operator.name.isidentifier() or operator.name in PRESETS or operator.name == "stop":
         raise ConfigError(
-            f"operators {name!r} are unknown; give one of {', '.join(PRESETS)}, "
-            f"or a comma list of {', '.join(OPERATORS)}"
+            f"an operator cannot be called {operator.name!r}; give it a name of its own, such as edge_cap"
         )
-    return tuple(OPERATORS[part] for part in names)
+    known = OPERATORS.setdefault(operator.name, operator)
+    if known != operator:
+        raise ConfigError(f"{operator.name!r} is an operator of {known.module} already; give yours another name")
+    return known
+
+
+def operator_named(name: str) -> Operator:
+    """The operator of that name. Raises ConfigError if there is none."""
+    if name not in OPERATORS:
+        raise ConfigError(
+            f"operator {name!r} is unknown; give names from {', '.join(OPERATORS)}, or one of your own as "
+            f"my.module:{name if name.isidentifier() else 'my_operator'}"
+        )
+    return OPERATORS[name]
+
+
+def preset(given: str | Iterable[str | Operator]) -> tuple[Operator, ...]:
+    """The operators that are asked for, in that order: presets ("paper", "full"), names, or `my.module:my_operator`,
+    with commas between them or as a list, in which operators themselves may stand, too.
+
+    Those of one's own are registered. Raises ConfigError for what is none of these, and an operator named twice.
+    """
+    parts = [part.strip() for part in given.split(",")] if isinstance(given, str) else list(given)
+    found: list[Operator] = []
+    for part in parts:
+        found += _asked_for(part)
+    names = [operator.name for operator in found]
+    twice = [name for k, name in enumerate(names) if name in names[:k]]
+    if twice:
+        raise ConfigError(f"operators {_shown(given)}: {twice[0]} stands there twice; name it once")
+    return tuple(found)
+
+
+def _asked_for(part: str | Operator) -> tuple[Operator, ...]:
+    if isinstance(part, Operator):
+        return (register(part),)
+    if not isinstance(part, str):
+        raise ConfigError(f"operator {part!r}: expected a name or an Operator")
+    if part in PRESETS:
+        return PRESETS[part]
+    if ":" in part:
+        return (register(_imported(part)),)
+    if part not in OPERATORS:
+        raise ConfigError(
+            f"operators {part!r} are unknown; give some of {', '.join((*PRESETS, *OPERATORS))} with commas between "
+            "them, or one of your own as my.module:my_operator"
+        )
+    return (OPERATORS[part],)
+
+
+def _imported(place: str) -> Operator:
+    """The operator at `my.module:my_operator`."""
+    module, _, name = place.partition(":")
+    try:
+        operator = getattr(import_module(module), name)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise ConfigError(f"operator {place!r} is not there ({error}); give module:name of an Operator") from None
+    if not isinstance(operator, Operator):
+        raise ConfigError(f"{place} is a {type(operator).__name__}; expected an autopoly_env.operators.Operator")
+    return operator
+
+
+def _shown(given: str | Iterable[str | Operator]) -> str:
+    return repr(given if isinstance(given, str) else [getattr(part, "name", part) for part in given])

@@ -1,5 +1,6 @@
-"""Where an action's new vertices start: what rendering and target disagree about, and what to do about it."""
+"""Where an action's new vertices start: what rendering and target disagree about, and what an action makes of it."""
 
-from autopoly_env.placement.starting import Disagreement, Start, hole_shapes, leaves_outline_alone, starts
+from autopoly_env.placement.disagreement import Disagreement
+from autopoly_env.placement.trial import Trial, tried
 
-__all__ = ["Disagreement", "Start", "hole_shapes", "leaves_outline_alone", "starts"]
+__all__ = ["Disagreement", "Trial", "tried"]

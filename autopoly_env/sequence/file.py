@@ -63,17 +63,7 @@ class _Document:
     steps: tuple[Step, ...]
 
 
-@dataclass(frozen=True)
-class _Hole:
-    __pydantic_config__ = _STRICT
-
-    points: tuple[tuple[Number, Number], ...]
-    bridges: tuple[tuple[Id, Id], tuple[Id, Id]]
-
-
 _DOCUMENT = TypeAdapter(_Document)
-_HOLE = TypeAdapter(_Hole)
-_ID = TypeAdapter(Id)
 
 
 def dump_json(settings: dict[str, Any], start: PolyMesh, start_score: Score, steps: tuple[Step, ...]) -> str:
@@ -110,22 +100,6 @@ def parse_json(text: str) -> tuple[dict[str, Any], PolyMesh, Score, tuple[Step, 
     for number, step in enumerate(document.steps, 1):
         check_score(step.score, f"step {number}")
     return document.settings, _start_mesh(document.start), document.start.score, document.steps
-
-
-def parse_hole(choice: dict[str, Any]) -> _Hole:
-    """The points and bridges of a `face_hole` choice. Raises SequenceError if they are not there."""
-    try:
-        return _HOLE.validate_python(choice)
-    except ValidationError as error:
-        raise SequenceError(f"choice.{_first_defect(error)}") from None
-
-
-def parse_id(value: object, where: str) -> int:
-    """A vertex or face id. Raises SequenceError if `value` is none."""
-    try:
-        return _ID.validate_python(value)
-    except ValidationError:
-        raise SequenceError(f"{where} is {_short(value)}; give an id, an integer from 0") from None
 
 
 def check_score(score: Score, where: str) -> None:

@@ -13,9 +13,10 @@ import numpy as np
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import MeshError, SequenceError
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import OPERATORS, Action, Choice
+from autopoly_env.operators import Action, Choice, Operator, operator_named
+from autopoly_env.operators.choices import Renaming
 from autopoly_env.sequence.file import Step
-from autopoly_env.sequence.ids import choice_indices, decoded, element_index
+from autopoly_env.sequence.ids import choice_indices, decoded
 
 _ALIKE = 0.5  # share of the corners of two faces, of old and new, that they need to have in common to be one
 
@@ -39,9 +40,9 @@ class Follower:
         Vertices without an old position stay; all do, where it is not `is_moving`. Raises an AutoPolyError, and takes
         nothing, where the step is illegal.
         """
-        operator = OPERATORS[step.operator]
-        element = element_index(self.mesh, operator.element, self._element(step, before))
-        choice = choice_indices(self.mesh, operator, element, self._choice(step, place))
+        operator = operator_named(step.operator)
+        element = operator.element.index(self.mesh, self._element(step, before))
+        choice = choice_indices(self.mesh, operator, element, self._choice(operator, step, place))
         made = operator.apply(self.mesh, element, choice)
         created = [name for name in made.vertex_ids if name >= self.mesh.next_vertex_id]
         olds = step.created["vertices"]
@@ -99,18 +100,10 @@ class Follower:
             raise SequenceError(f"face {name} is not there any more; drop this step, too")
         return self._faces[name]
 
-    def _choice(self, step: Step, place: Place) -> dict[str, Any] | None:
-        match step.choice:
-            case {"to": int(name)}:
-                return {"to": self._vertex(name)}
-            case {"points": points, "bridges": bridges}:
-                placed = place(np.array(points, np.float64)).tolist()
-                names = [(self._vertex(name), int(corner)) for name, corner in bridges]
-                if self._is_mirrored:
-                    placed = placed[::-1]
-                    names = [(name, len(placed) - 1 - corner) for name, corner in names]
-                return {"points": placed, "bridges": names}
-        return step.choice
+    def _choice(self, operator: Operator, step: Step, place: Place) -> dict[str, Any] | None:
+        if step.choice is None or operator.choice is None:
+            return step.choice
+        return operator.choice.renamed(step.choice, Renaming(self._vertex, place, self._is_mirrored))
 
     def _placed(self, made: PolyMesh, after: PolyMesh, place: Place) -> PolyMesh:
         present = set(made.vertex_ids)

@@ -14,10 +14,11 @@ from autopoly_env.errors import AutoPolyError, SequenceError
 from autopoly_env.files import write_atomically
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import STOP, Action, Choice
+from autopoly_env.operators.wording import element_words
 from autopoly_env.sequence import variation
 from autopoly_env.sequence.file import Score, Step, check_score, dump_json, parse_json, plain_json
 from autopoly_env.sequence.follower import Place
-from autopoly_env.sequence.ids import choice_ids, decoded, element_ids, element_words, operator_named
+from autopoly_env.sequence.ids import choice_ids, decoded, operator_named
 
 __all__ = ["ConstructionSequence", "Step"]
 
@@ -196,8 +197,8 @@ def _record_step(mesh: PolyMesh, action: Action, choice: Choice | None, after: P
     moved = tuple((name, x, y) for name, (x, y), differs in positions if differs)
     return Step(
         action.operator,
-        element_ids(mesh, operator.element, element),
-        choice_ids(mesh, element, choice),
+        operator.element.ids(mesh, element),
+        choice_ids(mesh, operator, element, choice),
         created,
         removed,
         moved,

@@ -18,12 +18,12 @@ from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import AutoPolyError, SequenceError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import Action, Choice
+from autopoly_env.operators.wording import element_words
 from autopoly_env.raster import coverage
 from autopoly_env.score import ScoreWeights, score
 from autopoly_env.sequence.deformation import ThinPlate
 from autopoly_env.sequence.file import Score, Step
 from autopoly_env.sequence.follower import Follower, Place, Taken, mirror_image, moved_to
-from autopoly_env.sequence.ids import element_words
 from autopoly_env.silhouette import Silhouette
 
 RESOLUTION = 256  # of the picture of the last mesh

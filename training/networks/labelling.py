@@ -19,10 +19,10 @@ from agents.registry import make_agent
 from agents.search.evaluator import ResidualEvaluator
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh, is_sane
-from autopoly_env.operators import OPERATORS, Action
+from autopoly_env.operators import Action
 from autopoly_env.score import Score, ScoreWeights
 from autopoly_env.sequence import ConstructionSequence
-from autopoly_env.sequence.ids import element_index
+from autopoly_env.sequence.ids import decoded
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator, State
 from autopoly_env.targets import ConstructionTargets, ObjectTargets
@@ -154,8 +154,8 @@ def _from_sequence(config: SourceConfig, silhouette: Silhouette, sequence: Const
     for mesh, step in zip(sequence.meshes(), (*sequence.steps, None), strict=True):
         taken = None
         if step is not None:
-            kind = OPERATORS[step.operator].element
-            taken = Action(step.operator, element_index(mesh, kind, step.element))
+            _, element, _ = decoded(mesh, step)
+            taken = Action(step.operator, element)
         states.append(_hard(simulator, mesh, taken))
     return Trajectory(silhouette.mask, tuple(states), ended=True)
 

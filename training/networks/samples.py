@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 from torch.utils.data import DataLoader, Dataset, Sampler
 
-from agents.guided.config import CLASSES, STOP_CLASS, NfapConfig, WarpConfig, class_of
+from agents.guided.config import STOP_CLASS, UNKNOWN, NfapConfig, WarpConfig, class_of
 from agents.guided.measures import candidate_arrays
 from agents.guided.pictures import draw_inputs, rendering
 from agents.guided.regions import region_image
@@ -22,7 +22,7 @@ from autopoly_env.compute import set_threads
 from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import OPERATORS, STOP, Action
-from autopoly_env.placement import Disagreement, starts
+from autopoly_env.placement import Disagreement, tried
 from training.networks.labelling import SourceConfig, build_trajectory
 from training.networks.trajectories import Labelled, Shard, Trajectory
 
@@ -69,9 +69,9 @@ class LabelConfig:
 def nfap_sample(trajectory: Trajectory, k: int, config: NfapConfig, labels: LabelConfig) -> Sample:
     """What nFAP-Net reads in state k, and the truth of its n stages; see `agents.guided.nfap.NfapLabels`."""
     size, state = config.image_size, trajectory.states[k]
-    classes = np.array([class_of(action) for action in state.actions])
+    classes = np.array([_class_of(action, config) for action in state.actions], np.int64)
     policy = labels.policy(state)
-    first = np.bincount(classes, policy[1:], len(CLASSES))
+    first = np.bincount(classes, policy[1:], len(config.classes))
     first[STOP_CLASS] = policy[0]
     images, regions, operators = zip(*_stages(trajectory, k, config), strict=True)
     expected = _expected_region(state, policy[1:] * (classes == operators[0]), config.image_size)
@@ -83,7 +83,7 @@ def nfap_sample(trajectory: Trajectory, k: int, config: NfapConfig, labels: Labe
         "regions": np.stack((expected, *regions[1:])),
         "operators": np.array(operators),
         "first": first.astype(np.float32),
-        **candidate_arrays(Disagreement(state.mesh, trajectory.silhouette), state.actions),
+        **candidate_arrays(Disagreement(state.mesh, trajectory.silhouette), state.actions, config.classes),
         "log_residual": state.log_residual,
         "policy": (policy[1:] / moving if moving > 1e-6 else 0.0 * policy[1:]).astype(np.float32),
         "gains": np.where(np.isfinite(gains), gains, -1e3).astype(np.float32),
@@ -109,8 +109,19 @@ def _stages(trajectory: Trajectory, k: int, config: NfapConfig) -> Iterator[tupl
         yield (
             rendering(after, config.image_size),
             region_image(state.mesh, action, config.image_size),
-            class_of(action),
+            _class_of(action, config),
         )
+
+
+def _class_of(action: Action, config: NfapConfig) -> int:
+    """The class of a labelled action. Raises ConfigError for one that the network has no class for."""
+    known = class_of(action, config.classes)
+    if known == UNKNOWN:
+        raise ConfigError(
+            f"the data has actions of {action.operator}, the network's classes are {', '.join(config.classes)}: "
+            "add it to them with net.classes"
+        )
+    return known
 
 
 def warp_sample(trajectory: Trajectory, k: int, config: WarpConfig, placed: bool) -> Sample:
@@ -135,7 +146,7 @@ def start_mesh(trajectory: Trajectory, state: Labelled, placed: bool) -> PolyMes
     action: Action = state.actions[state.chosen]
     try:
         if placed:
-            return starts(Disagreement(state.mesh, trajectory.silhouette), action)[0][1]
+            return tried(Disagreement(state.mesh, trajectory.silhouette), action).starts[0].mesh
         return OPERATORS[action.operator].apply(state.mesh, action.element)
     except IllegalActionError:  # a hole that fits nowhere but where the sequence has it
         return state.mesh

@@ -1,7 +1,7 @@
 """Blender: a Python script that rebuilds the mesh there, step by step, with Blender's own operators."""
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +10,9 @@ from autopoly_env.export.replay import finite_meshes, sequence_name, unmoved
 from autopoly_env.export.solid import check_depth
 from autopoly_env.files import write_atomically
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import HOLE_SIDES, OPERATORS, Operator
+from autopoly_env.operators import operator_named
 from autopoly_env.sequence import ConstructionSequence, Step
-from autopoly_env.sequence.file import parse_hole
-from autopoly_env.sequence.ids import element_index
+from autopoly_env.sequence.ids import decoded
 
 TEMPLATE = Path(__file__).with_name("template.py")  # a whole script; its construction is replaced
 BEGIN, END = "# --- the construction ---\n", "# --- what a step is in Blender ---\n"
@@ -21,7 +20,6 @@ DIGITS = 7  # behind the point; Blender's own floats have about as many
 WIDTH = 100  # columns
 
 Place = tuple[float, float]
-Arguments = list[Any]  # integers, and lists of places
 
 
 def save_blender_script(
@@ -49,7 +47,8 @@ def blender_script(sequence: ConstructionSequence, *, depth: float = 0.0, keyfra
         f"DEPTH = {float(depth)!r}  # thickness, in units of the unit square; 0 is flat",
         f"KEYFRAMES = {bool(keyframes)}  # an object for every step, shown one after the other",
     ]
-    return "\n".join([head + BEGIN, *constants, "\n", *_build(sequence, meshes), "\n", END + tail])
+    own = _own_code(sequence)
+    return "\n".join([head + BEGIN, *constants, "\n", *_build(sequence, meshes), "\n", *own, END + tail])
 
 
 def _build(sequence: ConstructionSequence, meshes: list[PolyMesh]) -> list[str]:
@@ -72,78 +71,32 @@ def _build(sequence: ConstructionSequence, meshes: list[PolyMesh]) -> list[str]:
     ]
     for number, (step, before, after) in enumerate(zip(sequence.steps, meshes, meshes[1:], strict=False), 1):
         lines += ["", f"    # Step {number}: IoU {step.score['iou']:.4f}, total {step.score['total']:.2f}"]
-        element = element_index(before, _operator(step, number).element, step.element)
+        arguments = _arguments(step, number, before)
         left = _places(after.with_vertices(unmoved(step, before, after)))
         moved = {name: place for name, place in _places(after).items() if left[name] != place}
-        lines.append(f"    {step.operator}({', '.join(map(repr, _ARGUMENTS[step.operator](step, before, element)))})")
+        lines.append(f"    {step.operator}({', '.join(map(repr, arguments))})")
         lines += [f"    move({_dict_text(moved, 4)})"] if moved else []
         lines.append(f"    expect({', '.join(map(str, after.counts))})")
     return lines
 
 
-def _operator(step: Step, number: int) -> Operator:
-    if step.operator not in _ARGUMENTS:
-        raise SequenceError(f"step {number}: {step.operator} is not known to the Blender script; teach it there first")
-    return OPERATORS[step.operator]
+def _arguments(step: Step, number: int, mesh: PolyMesh) -> list[Any]:
+    """What the script's function for a step from `mesh` is called with; lists of points are turned to y up."""
+    operator, element, choice = decoded(mesh, step)
+    if operator.blender is None:
+        raise SequenceError(
+            f"step {number}: {operator.name} is not known to the Blender script; teach it there first, Operator.blender"
+        )
+    return [
+        [_place(x, y) for x, y in value] if isinstance(value, list) else value
+        for value in operator.blender(mesh, element, choice)
+    ]
 
 
-def _edge_subdivide(_step: Step, mesh: PolyMesh, edge: int) -> Arguments:
-    return [mesh.vertex_ids[v] for v in mesh.edges[edge]]
-
-
-def _edge_extrude(_step: Step, mesh: PolyMesh, edge: int) -> Arguments:
-    """The ends as the edge's face runs, which is the order of the copies."""
-    half_edge, _ = mesh.topology.edge_half_edges[edge]
-    return [mesh.vertex_ids[v] for v in mesh.topology.half_edges[half_edge]]
-
-
-def _face_split(step: Step, mesh: PolyMesh, corner: int) -> Arguments:
-    links = mesh.topology.links
-    face = links.faces[corner]
-    assert step.choice is not None
-    return [mesh.face_ids[face], *_backwards(mesh, face, mesh.vertex_ids[links.tails[corner]], step.choice["to"])]
-
-
-def _face_delete(_step: Step, mesh: PolyMesh, face: int) -> Arguments:
-    return [mesh.face_ids[face]]
-
-
-def _face_hole(step: Step, mesh: PolyMesh, hole: int) -> Arguments:
-    plan = parse_hole(step.choice or {})
-    corner_of = dict(plan.bridges)
-    face = hole // len(HOLE_SIDES)
-    a, b = _backwards(mesh, face, *corner_of)
-    corners = [_place(x, y) for x, y in plan.points]
-    return [mesh.face_ids[face], corners, a, corner_of[a], b, corner_of[b]]
-
-
-def _vertex_dissolve(_step: Step, mesh: PolyMesh, vertex: int) -> Arguments:
-    return [mesh.vertex_ids[vertex]]
-
-
-def _edge_dissolve(_step: Step, mesh: PolyMesh, edge: int) -> Arguments:
-    """The ends and the face that stays."""
-    return [*(mesh.vertex_ids[v] for v in mesh.edges[edge]), mesh.face_ids[mesh.topology.edge_faces[edge][0]]]
-
-
-_ARGUMENTS: dict[str, Callable[[Step, PolyMesh, int], Arguments]] = {
-    "edge_subdivide": _edge_subdivide,
-    "edge_extrude": _edge_extrude,
-    "face_split": _face_split,
-    "face_delete": _face_delete,
-    "face_hole": _face_hole,
-    "vertex_dissolve": _vertex_dissolve,
-    "edge_dissolve": _edge_dissolve,
-}
-
-
-def _backwards(mesh: PolyMesh, face: int, *vertices: int) -> list[int]:
-    """Vertex ids of a face in the order of its corners, the last one first.
-
-    The new part of a cut face lies between two corners; with y up faces run the other way round.
-    """
-    corners = [mesh.vertex_ids[v] for v in mesh.faces[face]]
-    return sorted(vertices, key=corners.index, reverse=True)
+def _own_code(sequence: ConstructionSequence) -> list[str]:
+    """The functions that operators bring along."""
+    names = dict.fromkeys(step.operator for step in sequence.steps)
+    return [f"{code.strip()}\n\n" for name in names if (code := operator_named(name).blender_code)]
 
 
 def _places(mesh: PolyMesh) -> dict[int, Place]:

@@ -21,7 +21,7 @@ import numpy as np
 from autopoly_env.arrays import FloatArray
 from autopoly_env.export.pictures import picture_url
 from autopoly_env.export.player.words import Words, describe_start, describe_step
-from autopoly_env.export.replay import finite_meshes, unmoved
+from autopoly_env.export.replay import finite_meshes
 from autopoly_env.files import write_atomically
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.sequence import ConstructionSequence, Step
@@ -33,8 +33,6 @@ DIGITS = 5  # of a coordinate: a hundredth of a pixel on a screen
 MOVED = 0.002  # unit square; a vertex that moves less is not shown as moved
 FARTHEST = 10.0  # unit square; what lies farther out is not brought into view
 TARGET_SIZE = 768  # pixels a side of the target in the page, at most
-# What an operator takes away for good: its other elements become part of what is beside them.
-TAKES = {"face_delete": "all", "vertex_dissolve": "vertex", "edge_dissolve": "edge"}
 MARKED_CHARACTERS = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026", "\u2028": "\\u2028", "\u2029": "\\u2029"}
 
 
@@ -129,26 +127,26 @@ def _motion(before: PolyMesh, step: Step, after: PolyMesh) -> dict[str, Any]:
     operator, element, choice = decoded(before, step)
     made = operator.apply(before, element, choice)
     new = [made.vertex_index(name) for name in step.created["vertices"]]
-    sources = _sources(before, step, made, new)
+    sources = _sources(operator.sources_of(before, element, choice, made), made.vertices[new])
     put = {
         name: [*_rounded(source), *_rounded(made.vertices[v])]
         for name, v, source in zip(step.created["vertices"], new, sources, strict=True)
     }
-    lost = step.removed["vertices"] if step.operator == "vertex_dissolve" else []
+    lost = step.removed["vertices"] if operator.takes == "vertex" else []
     way = np.hypot(*(after.vertices - made.vertices).T)
     return {
         "put": put,
         "lost": {name: _rounded(_foot(before, before.vertex_index(name))) for name in lost},
         "moved": [name for name, length in zip(after.vertex_ids, way, strict=True) if length >= MOVED],
-        "takes": TAKES.get(step.operator),
+        "takes": operator.takes or None,
     }
 
 
-def _sources(before: PolyMesh, step: Step, made: PolyMesh, new: list[int]) -> FloatArray:
-    """(n, 2) where the new vertices grow out of: what they are copies of, the hole's middle, or where they are put."""
-    if step.operator == "face_hole":
-        return np.broadcast_to(made.vertices[new].mean(axis=0), (len(new), 2))
-    return unmoved(step, before, made)[new]
+def _sources(sources: FloatArray, put: FloatArray) -> FloatArray:
+    """(n, 2) where the new vertices grow out of; out of their middle, if the operator puts them all where they are."""
+    if len(put) > 1 and np.array_equal(sources, put):
+        return np.broadcast_to(put.mean(axis=0), put.shape)
+    return sources
 
 
 def _foot(mesh: PolyMesh, vertex: int) -> FloatArray:

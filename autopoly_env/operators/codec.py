@@ -1,28 +1,16 @@
-"""Actions: an operator on an element of the current mesh, and their numbering for a Discrete action space."""
+"""Actions by number, for a Discrete action space; which are legal; and what they are in words."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 
 from autopoly_env.arrays import BoolArray
 from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators.edits import HOLE_SIDES
-from autopoly_env.operators.registry import OPERATORS, Operator, n_elements
-
-CAPACITY_PER_VERTEX = {"vertex": 1, "edge": 2, "face": 1, "corner": 4, "hole": len(HOLE_SIDES)}
-
-
-@dataclass(frozen=True, slots=True)
-class Action:
-    """What to do next: the name of an operator and the index of its element in the current mesh."""
-
-    operator: str
-    element: int
-
-
-STOP = Action("stop", 0)
+from autopoly_env.operators.action import STOP, Action
+from autopoly_env.operators.elements import CAPACITY_PER_VERTEX
+from autopoly_env.operators.operator import Operator
+from autopoly_env.operators.registry import operator_named
 
 
 class ActionCodec:
@@ -41,12 +29,11 @@ class ActionCodec:
             raise ConfigError(f"max_vertices is {max_vertices}; give at least 4, a rectangle")
         self.operators = operators
         self.max_vertices = max_vertices
-        self.capacity = {kind: n * max_vertices for kind, n in CAPACITY_PER_VERTEX.items()}
         self._start: dict[str, int] = {}
         self.n_actions = 1
-        for operator in _look_up(operators):
+        for operator in map(operator_named, operators):
             self._start[operator.name] = self.n_actions
-            self.n_actions += self.capacity[operator.element]
+            self.n_actions += self._capacity(operator)
 
     def encode(self, action: Action) -> int:
         """The index of an action. Raises IllegalActionError if it has none."""
@@ -56,7 +43,7 @@ class ActionCodec:
             raise IllegalActionError(
                 f"no index for {action.operator!r}; give stop or one of {', '.join(self.operators)}"
             )
-        capacity = self.capacity[OPERATORS[action.operator].element]
+        capacity = self._capacity(operator_named(action.operator))
         if not 0 <= action.element < capacity:
             raise IllegalActionError(f"no index for {action}; its element must lie in 0..{capacity - 1}")
         return self._start[action.operator] + action.element
@@ -70,18 +57,28 @@ class ActionCodec:
         name = max((name for name, start in self._start.items() if start <= index), key=self._start.__getitem__)
         return Action(name, int(index) - self._start[name])
 
+    def indices_of(self, operator: str) -> slice:
+        """The numbers of all actions of an operator. Raises ConfigError if it is not one of the codec's."""
+        if operator not in self._start:
+            raise ConfigError(f"no index for {operator!r}; give one of {', '.join(self.operators)}")
+        start = self._start[operator]
+        return slice(start, start + self._capacity(operator_named(operator)))
+
     def legal_mask(self, mesh: PolyMesh) -> BoolArray:
         """(n_actions,) the actions that the mesh allows and that stay within the capacities; STOP always."""
         mask = np.zeros(self.n_actions, np.bool_)
         mask[0] = True
-        for operator in _look_up(self.operators):
+        for operator in map(operator_named, self.operators):
             legal = self._within_capacity(operator, mesh)
-            start, n = self._start[operator.name], min(len(legal), self.capacity[operator.element])
+            start, n = self._start[operator.name], min(len(legal), self._capacity(operator))
             mask[start : start + n] = legal[:n]
         return mask
 
+    def _capacity(self, operator: Operator) -> int:
+        return operator.element.per_vertex * self.max_vertices
+
     def _within_capacity(self, operator: Operator, mesh: PolyMesh) -> BoolArray:
-        limits = self.max_vertices, self.capacity["edge"], self.capacity["face"]
+        limits = [CAPACITY_PER_VERTEX[kind] * self.max_vertices for kind in ("vertex", "edge", "face")]
         legal = operator.legal_mask(mesh).copy()
         for i, change in enumerate(operator.changes):
             if any(d > 0 and n + d > limit for n, d, limit in zip(mesh.counts, change, limits, strict=True)):
@@ -93,7 +90,7 @@ def legal_actions(mesh: PolyMesh, operators: Iterable[str]) -> list[Action]:
     """Every action of the named operators that the mesh allows; without capacities, and without STOP."""
     return [
         Action(operator.name, element)
-        for operator in _look_up(operators)
+        for operator in map(operator_named, operators)
         for element in np.flatnonzero(operator.legal_mask(mesh)).tolist()
     ]
 
@@ -102,27 +99,7 @@ def describe(mesh: PolyMesh, action: Action) -> str:
     """The action in words, with ids: `edge_subdivide edge 3–7`, `face_hole face 0, 4 sides`, `stop`."""
     if action == STOP:
         return "stop"
-    kind, element = OPERATORS[action.operator].element, action.element
-    if not 0 <= element < n_elements(mesh, kind):
-        return f"{action.operator} {kind} #{element}, not in this mesh"
-    links, vertex_ids, face_ids = mesh.topology.links, mesh.vertex_ids, mesh.face_ids
-    match kind:
-        case "edge":
-            a, b = mesh.edges[element]
-            where = f"edge {vertex_ids[a]}–{vertex_ids[b]}"
-        case "corner":
-            where = f"face {face_ids[links.faces[element]]} at vertex {vertex_ids[links.tails[element]]}"
-        case "hole":
-            face, sides = divmod(element, len(HOLE_SIDES))
-            where = f"face {face_ids[face]}, {HOLE_SIDES[sides]} sides"
-        case _:
-            where = f"{kind} {(vertex_ids if kind == 'vertex' else face_ids)[element]}"
-    return f"{action.operator} {where}"
-
-
-def _look_up(operators: Iterable[str]) -> list[Operator]:
-    names = list(operators)
-    unknown = [name for name in names if name not in OPERATORS]
-    if unknown:
-        raise ConfigError(f"operator {unknown[0]!r} is unknown; give names from {', '.join(OPERATORS)}")
-    return [OPERATORS[name] for name in names]
+    kind = operator_named(action.operator).element
+    if not 0 <= action.element < kind.count(mesh):
+        return f"{action.operator} {kind.name} #{action.element}, not in this mesh"
+    return f"{action.operator} {kind.words(kind.ids(mesh, action.element))}"

@@ -1,0 +1,104 @@
+"""What an action leaves free, between a mesh, where it counts by indices, and a sequence, where it names ids."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+
+from autopoly_env.arrays import FloatArray
+from autopoly_env.errors import SequenceError
+from autopoly_env.mesh import PolyMesh
+from autopoly_env.operators.action import Choice
+from autopoly_env.operators.elements import corner_position, hole_face
+from autopoly_env.operators.holes import HoleChoice
+
+ChoiceIds = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Renaming:
+    """How a construction is told again on another mesh: which vertex is which, and where points go."""
+
+    vertex: Callable[[int], int]  # id there by id here; raises SequenceError for one that is not there
+    place: Callable[[FloatArray], FloatArray]  # of points (P, 2)
+    is_mirrored: bool = False  # faces run the other way there
+
+
+@dataclass(frozen=True)
+class ChoiceCodec:
+    """How a choice is written down, read and told again."""
+
+    ids: Callable[[PolyMesh, int, Choice], ChoiceIds]  # of (mesh, element, choice), as a step names it
+    indices: Callable[[PolyMesh, int, ChoiceIds], Choice]  # back; raises SequenceError for what it is not
+    renamed: Callable[[ChoiceIds, Renaming], ChoiceIds]  # on another mesh; raises SequenceError
+
+
+_Id = Annotated[int, Field(strict=True, ge=0)]
+_Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+
+
+@dataclass(frozen=True)
+class _Hole:
+    __pydantic_config__ = ConfigDict(extra="forbid")
+
+    points: tuple[tuple[_Number, _Number], ...]
+    bridges: tuple[tuple[_Id, _Id], tuple[_Id, _Id]]
+
+
+_HOLE = TypeAdapter(_Hole)
+
+
+def _corner_choice_ids(mesh: PolyMesh, _corner: int, choice: Choice) -> ChoiceIds:
+    assert isinstance(choice, int | np.integer)
+    return {"to": mesh.vertex_ids[mesh.topology.links.tails[int(choice)]]}
+
+
+def _corner_choice(mesh: PolyMesh, corner: int, ids: ChoiceIds) -> Choice:
+    if ids.keys() != {"to"}:
+        raise SequenceError(f"choice {ids}: expected the vertex to split to, {{'to': id}}")
+    to = ids["to"]
+    if isinstance(to, bool) or not isinstance(to, int) or to < 0:
+        raise SequenceError(f"choice.to is {_short(to)}; give an id, an integer from 0")
+    links = mesh.topology.links
+    face = links.faces[corner]
+    return links.offsets[face] + corner_position(mesh, face, to)
+
+
+def _hole_choice_ids(mesh: PolyMesh, hole: int, choice: Choice) -> ChoiceIds:
+    assert isinstance(choice, HoleChoice)
+    face = mesh.faces[hole_face(hole)[0]]
+    return {
+        "points": [[float(x), float(y)] for x, y in choice.points],
+        "bridges": [[mesh.vertex_ids[face[i]], int(corner)] for i, corner in choice.bridges],
+    }
+
+
+def _hole_choice(mesh: PolyMesh, hole: int, ids: ChoiceIds) -> Choice:
+    try:
+        plan = _HOLE.validate_python(ids)
+    except ValidationError as error:
+        defect = error.errors(include_url=False)[0]
+        raise SequenceError(f"choice.{'.'.join(map(str, defect['loc'])) or 'all of it'}: {defect['msg']}") from None
+    (a, i), (b, j) = plan.bridges
+    face, _ = hole_face(hole)
+    return HoleChoice(plan.points, ((corner_position(mesh, face, a), i), (corner_position(mesh, face, b), j)))
+
+
+def _renamed_hole(ids: ChoiceIds, renaming: Renaming) -> ChoiceIds:
+    placed = renaming.place(np.array(ids["points"], np.float64)).tolist()
+    bridges = [(renaming.vertex(name), int(corner)) for name, corner in ids["bridges"]]
+    if renaming.is_mirrored:
+        placed = placed[::-1]
+        bridges = [(name, len(placed) - 1 - corner) for name, corner in bridges]
+    return {"points": placed, "bridges": bridges}
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 40 else text[:37] + "..."
+
+
+TO_CORNER = ChoiceCodec(_corner_choice_ids, _corner_choice, lambda ids, r: {"to": r.vertex(ids["to"])})
+OF_HOLE = ChoiceCodec(_hole_choice_ids, _hole_choice, _renamed_hole)

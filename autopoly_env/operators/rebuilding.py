@@ -1,0 +1,82 @@
+"""What operators are made of: meshes grown and shrunk, corners looked up, refusals that say why."""
+
+from collections.abc import Sequence
+from typing import TypeVar
+
+import numpy as np
+
+from autopoly_env.arrays import FloatArray
+from autopoly_env.errors import IllegalActionError
+from autopoly_env.mesh import Face, PolyMesh, Topology
+
+_Item = TypeVar("_Item")
+
+
+def refusal(operator: str, kind: str, element: int, reason: str) -> IllegalActionError:
+    """The error that says why an operator cannot work on an element."""
+    return IllegalActionError(f"{operator} cannot work on {kind} {element}: {reason}")
+
+
+def grown(
+    mesh: PolyMesh,
+    points: Sequence[Sequence[float]] | FloatArray,
+    faces: Sequence[Face],
+    n_new_faces: int = 0,
+) -> PolyMesh:
+    """The mesh with `points` appended and `faces` for its faces, of which the last `n_new_faces` are new."""
+    n, new_id, new_face = len(mesh.vertex_ids) + len(points), mesh.next_vertex_id, mesh.next_face_id
+    return PolyMesh(
+        np.concatenate((mesh.vertices, points)) if len(points) else mesh.vertices,
+        Topology(n, tuple(faces)),
+        (*mesh.vertex_ids, *range(new_id, new_id + len(points))),
+        (*mesh.face_ids, *range(new_face, new_face + n_new_faces)),
+        new_id + len(points),
+        new_face + n_new_faces,
+    )
+
+
+def shrunk(mesh: PolyMesh, faces: Sequence[Face], face_ids: tuple[int, ...]) -> PolyMesh:
+    """The mesh with only `faces`; vertices that no face uses any more go."""
+    used = set().union(*faces)
+    kept = [v for v in range(len(mesh.vertex_ids)) if v in used]
+    if len(kept) == len(mesh.vertex_ids):
+        vertices, renumbered = mesh.vertices, tuple(faces)
+    else:
+        index = {v: i for i, v in enumerate(kept)}
+        vertices, renumbered = mesh.vertices[kept], tuple(tuple(index[v] for v in face) for face in faces)
+    return PolyMesh(
+        vertices,
+        Topology(len(kept), renumbered),
+        tuple(mesh.vertex_ids[v] for v in kept),
+        face_ids,
+        mesh.next_vertex_id,
+        mesh.next_face_id,
+    )
+
+
+def corner_of(mesh: PolyMesh, corner: int) -> tuple[int, int]:
+    """The face of a corner (= half-edge) and the corner's position in it."""
+    links = mesh.topology.links
+    face = links.faces[corner]
+    return face, corner - links.offsets[face]
+
+
+def without(items: tuple[_Item, ...], i: int) -> tuple[_Item, ...]:
+    """The items but for number i."""
+    return (*items[:i], *items[i + 1 :])
+
+
+def ends_along_face(mesh: PolyMesh, edge: int) -> tuple[int, int]:
+    """The ends of an edge, by index, as its (lower) face runs."""
+    half_edge, _ = mesh.topology.edge_half_edges[edge]
+    links = mesh.topology.links
+    return links.tails[half_edge], links.heads[half_edge]
+
+
+def corners_from_last(mesh: PolyMesh, face: int, *vertex_ids: int) -> list[int]:
+    """Vertex ids of a face in the order of its corners, the last one first.
+
+    With y up faces run the other way round, so this is their order in Blender.
+    """
+    corners = [mesh.vertex_ids[v] for v in mesh.faces[face]]
+    return sorted(vertex_ids, key=corners.index, reverse=True)

@@ -1,0 +1,80 @@
+"""`vertex_dissolve`: a boundary vertex of valence 2 removed, as Blender's Dissolve Vertices."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from autopoly_env.arrays import BoolArray
+from autopoly_env.mesh import PolyMesh
+from autopoly_env.operators.action import Choice, Start
+from autopoly_env.operators.elements import VERTEX
+from autopoly_env.operators.mirroring import again
+from autopoly_env.operators.operator import Mirroring, Operator
+from autopoly_env.operators.rebuilding import corner_of, refusal, shrunk, without
+from autopoly_env.operators.wording import VERTICES, Phrases, begun_with, element_words
+
+
+def dissolvable_vertices(mesh: PolyMesh) -> BoolArray:
+    """(V,) the boundary vertices with two edges, of no triangle, whose neighbours are not joined already."""
+    return np.array([_defect(mesh, v) is None for v in range(len(mesh.vertex_ids))], np.bool_)
+
+
+def _defect(mesh: PolyMesh, vertex: int) -> str | None:
+    corner = mesh.topology.lone_corners[vertex]
+    if corner < 0:
+        return "more than two edges or one face meet there; choose a boundary vertex of valence 2"
+    f, i = corner_of(mesh, corner)
+    face = mesh.faces[f]
+    if len(face) == 3:
+        return "its face is a triangle; choose a vertex of a larger face"
+    a, b = face[i - 1], face[(i + 1) % len(face)]
+    if (min(a, b), max(a, b)) in mesh.topology.edge_lookup:
+        return "its two neighbours are joined by an edge already; choose another"
+    return None
+
+
+def dissolve(mesh: PolyMesh, vertex: int, _choice: Choice | None) -> PolyMesh:
+    """The mesh without the vertex; its two edges become one."""
+    defect = _defect(mesh, vertex)
+    if defect is not None:
+        raise refusal("vertex_dissolve", "vertex", vertex, defect)
+    f, i = corner_of(mesh, mesh.topology.lone_corners[vertex])
+    return shrunk(mesh, (*mesh.faces[:f], without(mesh.faces[f], i), *mesh.faces[f + 1 :]), mesh.face_ids)
+
+
+def _mirror(of: Mirroring, start: Start) -> Iterator[Start]:
+    image = int(of.images[of.action.element])
+    if image == of.action.element:
+        yield start
+        return
+    first = start.mesh
+    second, halfway = again(vertex_dissolve, first, first.vertex_index(of.mesh.vertex_ids[image]))
+    yield Start(start.choice, second, halfway)
+
+
+def _blender(mesh: PolyMesh, vertex: int, _choice: Choice | None) -> list[Any]:
+    return [mesh.vertex_ids[vertex]]
+
+
+vertex_dissolve = Operator(
+    "vertex_dissolve",
+    VERTEX,
+    "a boundary vertex of valence 2 removed, its two edges made one",
+    ((-1, -1, 0),),
+    dissolvable_vertices,
+    dissolve,
+    mirror=_mirror,
+    takes="vertex",
+    phrases=Phrases(
+        "Dissolve a vertex",
+        lambda step: f"{begun_with(step)} is dissolved: its two edges become one.",
+        lambda step: (
+            f"{VERTICES} vertex select, click {element_words(step)}",
+            "`Ctrl` `X`, or `X` › Dissolve Vertices",
+        ),
+        "Mesh › Delete › Dissolve Vertices",
+        "mesh.dissolve_verts",
+    ),
+    blender=_blender,
+)

@@ -1,0 +1,62 @@
+"""How a step is told: what happened, and what to press in Blender to do the same by hand."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+EDGES, FACES, VERTICES = "`2`", "`3`", "`1`"  # Blender's select modes
+
+
+class Told(Protocol):
+    """A step, by ids: see `autopoly_env.sequence.Step`."""
+
+    @property
+    def element(self) -> Mapping[str, Any]: ...
+    @property
+    def choice(self) -> Mapping[str, Any] | None: ...
+    @property
+    def created(self) -> Mapping[str, list[int]]: ...
+    @property
+    def removed(self) -> Mapping[str, list[int]]: ...
+
+
+@dataclass(frozen=True)
+class Phrases:
+    """What there is to say about the steps of one operator; keys to press stand between backticks."""
+
+    title: str  # "Extrude an edge"
+    done: Callable[[Told], str]  # what happened, a sentence with ids
+    keys: Callable[[Told], tuple[str, ...]]  # what to do in Blender's edit mode, one after the other
+    menu: str  # where Blender has the same in its menus
+    blender: str  # the name of Blender's operator
+
+
+def element_words(step: Told) -> str:
+    """The element of a step: `edge 3–7`, `face 0, vertex 2`."""
+    words = {
+        key: "–".join(map(str, value)) if isinstance(value, list) else value for key, value in step.element.items()
+    }
+    return ", ".join(f"{key} {value}" for key, value in words.items())
+
+
+def begun_with(step: Told) -> str:
+    """The same at the beginning of a sentence."""
+    return element_words(step).capitalize()
+
+
+def count(n: int, noun: str) -> str:
+    """`1 face`, `2 vertices`."""
+    plural = {"vertex": "vertices"}.get(noun, f"{noun}s")
+    return f"{n} {noun if n == 1 else plural}"
+
+
+def phrases_of(name: str, effect: str) -> Phrases:
+    """What can be said of any operator."""
+    title = name.replace("_", " ").capitalize()
+    return Phrases(
+        title,
+        lambda step: f"{begun_with(step)}: {effect}.",
+        lambda step: (f"{title}, {element_words(step)}: {effect}",),
+        "",
+        "",
+    )

@@ -1,0 +1,91 @@
+"""What separates a rendering from its target, and which boundary edges and faces are to blame for it.
+
+Every pixel in which the two disagree is blamed on the nearest boundary edge; of an edge's blame the connected region
+with most of it counts.
+"""
+
+from functools import cached_property
+
+import numpy as np
+import shapely
+
+from autopoly_env.arrays import FloatArray
+from autopoly_env.mesh import PolyMesh, defects_of
+from autopoly_env.operators.evidence import Blame, Region
+from autopoly_env.placement import blame_kernels
+from autopoly_env.placement.blame_kernels import AREA, DEEP_X, DEEP_Y, MASS
+from autopoly_env.raster import coverage
+from autopoly_env.silhouette import Silhouette
+
+RESOLUTION = 64  # at which disagreement is looked at
+THRESHOLD = 0.3  # of a pixel's coverage, above which it disagrees
+_MISSING, _EXCESS = 0, 1
+
+
+class Disagreement:
+    """What separates a mesh's rendering from the target: the `operators.evidence.Evidence` for all that follows."""
+
+    def __init__(self, mesh: PolyMesh, silhouette: Silhouette) -> None:
+        self.mesh = mesh
+        covered = np.minimum(coverage(mesh, RESOLUTION), 1.0)
+        target = silhouette.target(RESOLUTION)
+        self.difference: FloatArray = target.coverage - covered
+        if target.weights is None:
+            self.labels, self.n_regions = blame_kernels.regions_of(self.difference, THRESHOLD)
+        else:  # pixels of weight 0 do not disagree, the others count as much as they weigh
+            seen = np.where(target.weights > 0.0, self.difference, 0.0)
+            self.labels, self.n_regions = blame_kernels.regions_of(seen, THRESHOLD)
+            self.difference = self.difference * target.weights
+
+    @cached_property
+    def blame(self) -> FloatArray:
+        """(B, 2, 6) see `blame_kernels.blame_edges`; rows as `Topology.boundary_half_edges`."""
+        edges = self.mesh.topology.boundary_half_edges
+        table: FloatArray = blame_kernels.blame_edges(
+            self.mesh.vertices, edges, self.difference, self.labels, self.n_regions
+        )
+        return table
+
+    @cached_property
+    def row_of_edge(self) -> dict[int, int]:
+        """Row of `blame` by edge index."""
+        directed = self.mesh.topology.boundary_half_edges.tolist()
+        return {self.mesh.edge_index(a, b): row for row, (a, b) in enumerate(directed)}
+
+    @cached_property
+    def regions(self) -> FloatArray:
+        """(L, 9) see `blame_kernels.measure_regions`."""
+        found: FloatArray = blame_kernels.measure_regions(self.difference, self.labels, self.n_regions)
+        return found
+
+    @cached_property
+    def defects(self) -> tuple[int, int]:
+        """(crossings, flipped faces) of the mesh."""
+        return defects_of(self.mesh)
+
+    @cached_property
+    def most(self) -> tuple[float, float]:
+        """The largest masses that an edge is to blame for: what is missing, what is too much."""
+        masses = self.blame[:, :, MASS]
+        return float(masses[:, _MISSING].max()), float(masses[:, _EXCESS].max())
+
+    def missing(self, edge: int) -> Blame | None:
+        """What the rendering leaves bare beside an edge; None for an edge that is not on the boundary."""
+        return self._beside(edge, _MISSING)
+
+    def excess(self, edge: int) -> Blame | None:
+        """What the rendering shows too much of beside an edge; None for an edge that is not on the boundary."""
+        return self._beside(edge, _EXCESS)
+
+    def _beside(self, edge: int, side: int) -> Blame | None:
+        row = self.row_of_edge.get(edge, -1)
+        return None if row < 0 else Blame(*self.blame[row, side].tolist())
+
+    def excess_in(self, face: int) -> Region | None:
+        """The largest region that the rendering shows too much of and whose deepest pixel lies in the face."""
+        polygon = shapely.Polygon(self.mesh.vertices[list(self.mesh.faces[face])])
+        regions = self.regions[self.regions[:, AREA] < 0.0]
+        if len(regions) == 0 or not polygon.is_valid:
+            return None
+        regions = regions[shapely.contains_xy(polygon, regions[:, DEEP_X], regions[:, DEEP_Y])]
+        return Region(*regions[np.argmin(regions[:, AREA])].tolist()) if len(regions) else None
