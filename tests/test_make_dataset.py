@@ -22,7 +22,7 @@ from autopoly_env.files import write_atomically
 from autopoly_env.targets import ConstructionTargets
 from tests.commands import Run, runner
 from tests.shapes import shapely_coverage
-from training.datasets.build import MAX_N, MAX_SEED, SPLITS, Settings, build_dataset
+from training.datasets.build import MAX_N, MAX_SEED, SEEDS, Settings, build_dataset
 from training.datasets.shards import Example, checksum, pack, read_manifest, read_shards, unpack
 from training.make_dataset import main
 
@@ -84,7 +84,7 @@ def test_target__depends_on_seed_and_number_alone(run: Run) -> None:
 def test_source_seeds__of_different_seeds_and_splits_do_not_meet() -> None:
     """Every (split, seed) has MAX_N source seeds in a row: it is enough that their ends keep order."""
     ranges = []
-    for split in SPLITS:
+    for split in SEEDS:
         for seed in range(MAX_SEED + 1):
             settings = Settings("constructions", split, seed)
             ranges.append((settings.source_seed(0), settings.source_seed(MAX_N - 1)))

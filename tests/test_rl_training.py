@@ -16,7 +16,7 @@ from stable_baselines3.common.vec_env import SubprocVecEnv
 
 from agents.registry import make_agent
 from agents.rl.algorithms import MaskedDqn, make_model
-from agents.rl.envs import N_SEEDS, Course, NativeVecEnv, Table, make_vec_env
+from agents.rl.envs import Course, NativeVecEnv, Table, make_vec_env
 from agents.rl.network import NEVER, MeshNet, observer_of
 from agents.rl.player import Player
 from agents.rl.policies import net_of, put_net
@@ -26,6 +26,7 @@ from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import ActionCodec
 from autopoly_env.score import ScoreWeights
 from autopoly_env.simulator import Simulator
+from autopoly_env.targets import HELD_OUT, LEARNING
 from training import rl_clone, train_rl
 from training.networks.labelling import SourceConfig, build_trajectory
 from training.networks.samples import LabelConfig, collate, stored
@@ -34,7 +35,7 @@ from training.networks.trajectories import Shard, Trajectory
 from training.options import read_config
 from training.policies import export as rl_export
 from training.policies.config import OptimConfig, TrainRlConfig
-from training.policies.exam import HELD_OUT, Exam, exams_of, mean_final, play_all, sit_all
+from training.policies.exam import Exam, exams_of, mean_final, play_all, sit_all
 from training.rl_clone import CloneConfig, CloneTask, prepared, sample_of, turned
 
 torch.set_num_threads(1)  # as tests run beside each other
@@ -90,7 +91,7 @@ def test_practice__is_the_environment_with_mask_and_price() -> None:
         assert not truncated  # the steps that are left are in the observation
         rewards += reward
     assert rewards == pytest.approx(0.1 * (info["r_all"] - total)) == pytest.approx(info["episode"]["r"])
-    assert info["episode"]["l"] == 5 and int(info["target"].rpartition("_")[2]) < N_SEEDS
+    assert info["episode"]["l"] == 5 and int(info["target"].rpartition("_")[2]) in LEARNING
 
 
 def test_native_environments__do_what_each_does_alone() -> None:
@@ -427,7 +428,7 @@ def test_exam__is_of_held_out_targets_and_plays_as_the_agent_does(trained: dict[
     path = trained["maskable_ppo"] / "policy.safetensors"
     exams = exams_of(config().env, 2, 32)
     assert [exam.name for exam in exams] == ["construction", "objects"]
-    assert int(exams[0].simulators[1].silhouette.name.rpartition("_")[2]) == HELD_OUT + 1
+    assert int(exams[0].simulators[1].silhouette.name.rpartition("_")[2]) == HELD_OUT[1]
     player = Player(load_policy(path)[0])
     for path_of_states, simulator in zip(play_all(player, exams[0].simulators), exams[0].simulators, strict=True):
         state = simulator.initial()

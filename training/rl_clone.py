@@ -254,7 +254,7 @@ class CloneTask:
         self.net = MeshNet(config.net, config.env.rules())
         self.losses = CloneLosses(self.net, config.value_weight)
         self.stream = Pool(stored(config.data.shards), config, config.run.seed)
-        unseen = Pool(stored(config.data.held_out), config, config.run.seed, turn=False)
+        unseen = Pool(stored(config.data.held_out, held_out=True), config, config.run.seed, turn=False)
         self._held_out = HeldOut(unseen, config.data.n_held_out)
 
     def measure(self, device: torch.device) -> dict[str, float]:

@@ -23,5 +23,5 @@ class DataConfig:
     def trajectories(self) -> tuple[Trajectories, Trajectories]:
         """To train with, and to measure with. Raises ConfigError if a folder has no shards."""
         learn: Trajectories = stored(self.shards) if self.shards else Live(self.source)
-        test: Trajectories = stored(self.held_out) if self.held_out else Live(self.source, held_out=True)
+        test: Trajectories = stored(self.held_out, held_out=True) if self.held_out else Live(self.source, held_out=True)
         return learn, test

@@ -21,9 +21,8 @@ from autopoly_env.env import AutoPolyEnv, EnvState
 from autopoly_env.errors import ConfigError
 from autopoly_env.observation import Observation
 from autopoly_env.silhouette import Silhouette
-from autopoly_env.targets import ConstructionTargets, TargetSource, make_targets
+from autopoly_env.targets import LEARNING, ConstructionTargets, TargetSource, make_targets
 
-N_SEEDS = 2**30  # targets to learn from; those from here on are held out, as `training.make_expert` has it
 _HIGHEST_PRICE = 1e6
 
 
@@ -38,7 +37,7 @@ class _Learned:
         return self.source.name
 
     def sample(self, seed: int) -> Silhouette:
-        return self.source.sample(seed % N_SEEDS)
+        return self.source.sample(LEARNING[seed % len(LEARNING)])
 
 
 @dataclass(frozen=True)

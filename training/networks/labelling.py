@@ -25,11 +25,10 @@ from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence.ids import element_index
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator, State
-from autopoly_env.targets import ConstructionTargets, ObjectTargets
+from autopoly_env.targets import HELD_OUT, LEARNING, ConstructionTargets, ObjectTargets
 from training.networks.trajectories import STOPPED, Labelled, Trajectory
 
 _TRACED_PRICES = (0.5, 4.0)  # of complexity, in units of the one that counts, that traced outlines are made for
-_HELD_OUT = 2**30  # first seed of the held-out targets; all are of the split "train", none of "test"
 
 
 @dataclass(frozen=True)
@@ -69,7 +68,8 @@ class SourceConfig:
 def build_trajectory(config: SourceConfig, number: int, held_out: bool = False) -> Trajectory:
     """The labelled construction of this number; held-out ones are of other targets."""
     rng = np.random.default_rng((config.seed, number, int(held_out)))
-    seed = (_HELD_OUT if held_out else 0) + int(rng.integers(_HELD_OUT))
+    seeds = HELD_OUT if held_out else LEARNING
+    seed = seeds[int(rng.integers(len(seeds)))]
     if config.source == "simulator":
         targets = _constructions(config)
         return _from_sequence(config, targets.sample(seed), targets.sample_sequence(seed))

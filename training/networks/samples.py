@@ -4,6 +4,7 @@ Sample i of a stream depends on (seed, i) alone, however many processes make it.
 side, K operator classes, A actions, P points of each, Q vertices, E edges.
 """
 
+import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -203,12 +204,27 @@ class Stored:
         return self[int(rng.integers(len(self)))]
 
 
-def stored(folder: str) -> Stored:
-    """The shards of a folder. Raises ConfigError if there are none, or one is damaged."""
+def stored(folder: str, held_out: bool = False) -> Stored:
+    """The shards of a folder: to learn from, or of held-out targets, to measure with.
+
+    Raises ConfigError if there are none, if one is damaged, or if the folder says that they are for the other use.
+    """
     paths = sorted(Path(folder).glob("*.npz"))
     if not paths:
         raise ConfigError(f"no shards (*.npz) in {folder}; make some with python -m training.make_expert {folder}")
+    if _are_held_out(Path(folder)) is (not held_out):
+        kind, option = ("targets to learn from", "with") if held_out else ("held-out targets", "without")
+        raise ConfigError(f"{folder} has shards of {kind} (meta.json); give some that were made {option} --held-out")
     return Stored(paths)
+
+
+def _are_held_out(folder: Path) -> bool | None:
+    """Whether a folder's shards are of held-out targets; None where nothing legible says so."""
+    try:
+        said = json.loads((folder / "meta.json").read_text(encoding="utf-8"))["held_out"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return said if isinstance(said, bool) else None
 
 
 # --- streams ---

@@ -16,10 +16,9 @@ from autopoly_env.operators import STOP, Action
 from autopoly_env.score import ScoreWeights
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator, State
-from autopoly_env.targets import ConstructionTargets, TargetSource, make_targets
+from autopoly_env.targets import HELD_OUT, ConstructionTargets, TargetSource, make_targets
 from training.policies.config import EnvConfig
 
-HELD_OUT = 2**30  # first seed that training never draws; the split "test" begins at 2^31
 _BATCH = 64  # games at once
 
 
@@ -110,7 +109,7 @@ def exams_of(env: EnvConfig, n: int, resolution: int) -> tuple[Exam, ...]:
             source: TargetSource = ConstructionTargets(course.difficulty, course.operators)
         else:
             source = make_targets(course.targets)
-        silhouettes = [source.sample(HELD_OUT + k) for k in range(n)]
+        silhouettes = [source.sample(seed) for seed in HELD_OUT[:n]]
         name = course.targets if course.targets in ("construction", "objects") else "images"
         known = [exam.name for exam in exams]
         exams.append(
