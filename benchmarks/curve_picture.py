@@ -5,8 +5,8 @@ from html import escape
 
 import numpy as np
 
+from training.report import Interval
 from training.report.axes import Axis, number, tick_label
-from training.report.statistics import Interval
 
 PANEL_WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 470, 380, 52, 96, 34, 52
 COLOURS = ("#0072b2", "#d55e00", "#00875f", "#a24399", "#967100", "#69707c")

@@ -32,18 +32,18 @@ Curves = dict[str, dict[str, Curve]]  # by kind of target, then by training
 
 
 def learning_curves(groups: Mapping[str, Sequence[Sequence[Mapping[str, float]]]]) -> Curves:
-    """From the exams in the logs of each training's seeds; the n-th exams of the seeds belong together."""
+    """From the evaluations in the logs of each training's seeds; the n-th ones of the seeds belong together."""
     curves: Curves = {}
     for name, runs in groups.items():
         n = min((len(run) for run in runs), default=0)
         if not n:
             continue
-        kinds = [key[len("exam/") : -len("_final")] for key in runs[0][0] if key.endswith("_final")]
+        kinds = [key[len("eval/") : -len("_final")] for key in runs[0][0] if key.endswith("_final")]
         for kind in kinds:
-            values = np.array([[line[f"exam/{kind}_final"] for line in run[:n]] for run in runs])
-            minutes = np.median([[line["exam/minutes"] for line in run[:n]] for run in runs], axis=0)
+            values = np.array([[line[f"eval/{kind}_final"] for line in run[:n]] for run in runs])
+            minutes = np.median([[line["eval/minutes"] for line in run[:n]] for run in runs], axis=0)
             middle, low, high = np.median(values, axis=0), values.min(axis=0), values.max(axis=0)
-            start = float(runs[0][0][f"exam/{kind}_start"])
+            start = float(runs[0][0][f"eval/{kind}_start"])
             curve = Curve(minutes.tolist(), middle.tolist(), low.tolist(), high.tolist(), start)
             curves.setdefault(kind, {})[name] = curve
     return curves

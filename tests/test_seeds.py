@@ -11,17 +11,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from agents.guided.config import NfapConfig, WarpConfig
-from agents.rl.config import Rules
-from agents.rl.envs import Course, NativeVecEnv, Table, make_vec_env
+from agents.rl.config import SpaceSpec, TaskSpec
+from agents.rl.envs import EnvFactory, NativeVecEnv, make_vec_env
 from autopoly_env.errors import ConfigError
 from autopoly_env.targets import HELD_OUT, LEARNING, SPLITS
 from autopoly_env.targets.dice import Dice
 from training import make_expert
-from training.datasets.build import MAX_N, MAX_SEED, Settings
+from training.datasets.build import MAX_N, MAX_SEED, DatasetSettings
 from training.networks.labelling import SourceConfig, build_trajectory
-from training.networks.samples import LabelConfig, Live, NfapStream, WarpStream, stored
+from training.networks.samples import LabelConfig
+from training.networks.streams import Live, NfapStream, WarpStream, stored
 from training.policies.config import EnvConfig
-from training.policies.exam import exams_of
+from training.policies.evaluation import evaluations_of
 
 TEST = SPLITS["test"]
 NUMBERS = st.integers(0, 2**63 - 1)
@@ -64,8 +65,8 @@ def test_what_is_learnt_from_held_out_and_tested_on__have_nothing_in_common() ->
 @given(seed=st.integers(0, 2**32 - 1))
 @settings(max_examples=20)
 def test_environments_to_learn_in__draw_learning_seeds_only(seed: int) -> None:
-    table = Table(Rules(max_vertices=16, obs_resolution=32, max_steps=2), resolution=32)
-    envs = make_vec_env(table, [Course(), Course("objects", 0.3)], 2, "native", seed=seed % 2**31)
+    factory = EnvFactory(SpaceSpec(max_vertices=16, obs_resolution=32, max_steps=2), resolution=32)
+    envs = make_vec_env(factory, [TaskSpec(), TaskSpec("objects", 0.3)], 2, "native", seed=seed % 2**31)
     assert isinstance(envs, NativeVecEnv)
     with recorded() as seeds:
         for env in envs.envs:
@@ -77,9 +78,8 @@ def test_environments_to_learn_in__draw_learning_seeds_only(seed: int) -> None:
 
 
 def test_environments_that_play_on__draw_learning_seeds_only() -> None:
-    envs = make_vec_env(
-        Table(Rules(max_vertices=16, obs_resolution=32, max_steps=1), resolution=32), [Course()], 2, "native", seed=3
-    )
+    factory = EnvFactory(SpaceSpec(max_vertices=16, obs_resolution=32, max_steps=1), resolution=32)
+    envs = make_vec_env(factory, [TaskSpec()], 2, "native", seed=3)
     with recorded(playing=True) as seeds:
         envs.reset()
         for _ in range(25):
@@ -115,7 +115,7 @@ def test_live_samples_of_networks__are_of_learning_seeds_or_of_held_out_ones(
 def test_data_sets__keep_to_the_seeds_of_their_split(kind: Any, seed: int, index: int) -> None:
     for split, allowed in (("train", LEARNING), ("validation", HELD_OUT), ("test", TEST)):
         with recorded() as seeds, suppress(_AskedError):
-            Settings(kind, split, seed).example(index)
+            DatasetSettings(kind, split, seed).example(index)
         assert seeds == [allowed[seed * MAX_N + index]]
 
 
@@ -138,7 +138,7 @@ def test_shards_that_clones_and_networks_learn_from__are_of_learning_seeds(
 # --- what examines ---
 
 
-def test_exams_of_policies__are_of_held_out_seeds() -> None:
+def test_evaluations_of_policies__are_on_held_out_seeds() -> None:
     with recorded(playing=True) as seeds:
-        exams_of(EnvConfig(), 3, 32)
+        evaluations_of(EnvConfig(), 3, 32)
     assert seeds == [*HELD_OUT[:3], *HELD_OUT[:3]]

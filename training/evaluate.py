@@ -76,7 +76,7 @@ def evaluate(
 ) -> int:
     """Check what can be checked before the work, do it, show the table; return the exit code."""
     from training.evaluation.folder import merge as merge_runs
-    from training.evaluation.run import Machines, Shard, run_suite
+    from training.evaluation.run import Machines, TargetShard, run_suite
 
     _check_flags(suite, resume=resume, fresh=fresh, merge=merge)
     if merge:
@@ -84,7 +84,7 @@ def evaluate(
         merge_runs([Path(part) for part in suite], folder, fresh=fresh)
         return _finish(folder, baseline, as_json)
     found, only = _read(suite[0], override or [], budget, agents, baseline)
-    part = Shard.parse(shard)
+    part = TargetShard.parse(shard)
     folder = out or FOLDER / (found.name + (f"-{part.k}of{part.n}" if part.n > 1 else ""))
     machines = Machines(engine, workers, ray_address)
     try:

@@ -22,7 +22,7 @@ SEEDS = {"train": LEARNING, "validation": HELD_OUT, "test": SPLITS["test"]}  # o
 
 
 @dataclass(frozen=True)
-class Settings:
+class DatasetSettings:
     """What the targets of a data set are. No two seeds or splits share a target."""
 
     kind: Literal["constructions", "objects"]
@@ -64,7 +64,7 @@ class Settings:
 class ShardTask:
     """One shard to be made."""
 
-    settings: Settings
+    settings: DatasetSettings
     name: str
     indices: range
 
@@ -74,7 +74,9 @@ def make_shard(task: ShardTask) -> bytes:
     return pack([task.settings.example(index) for index in task.indices])
 
 
-def begin_dataset(folder: Path, settings: Settings, n: int, shard_size: int, *, resume: bool, fresh: bool) -> Manifest:
+def begin_dataset(
+    folder: Path, settings: DatasetSettings, n: int, shard_size: int, *, resume: bool, fresh: bool
+) -> Manifest:
     """The manifest to go on from, written; `resume` keeps the shards that are whole, `fresh` removes them all.
 
     Raises ConfigError if the folder has a data set and neither is asked for, or one of other settings; RunError if its
@@ -95,7 +97,7 @@ def begin_dataset(folder: Path, settings: Settings, n: int, shard_size: int, *, 
 
 def build_dataset(
     folder: Path,
-    settings: Settings,
+    settings: DatasetSettings,
     manifest: Manifest,
     *,
     engine: str = "process",
@@ -176,7 +178,7 @@ def _remove(folder: Path) -> None:
         raise OutputError(f"cannot remove the data set in {folder} ({error.strerror}); give another folder") from None
 
 
-def _plain(settings: Settings) -> dict[str, object]:
+def _plain(settings: DatasetSettings) -> dict[str, object]:
     """The settings that matter for their kind, as JSON gives them back."""
     values = {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(settings).items()}
     other = ("families",) if settings.kind == "constructions" else ("difficulty", "operators")

@@ -17,6 +17,7 @@ import numpy as np
 from agents.budget import Budget
 from agents.registry import make_agent
 from agents.search.evaluator import ResidualEvaluator
+from autopoly_env.arrays import Float32Array, FloatArray
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh, is_sane
 from autopoly_env.operators import OPERATORS, Action
@@ -119,8 +120,8 @@ def _taught(config: SourceConfig, simulator: Simulator, rng: np.random.Generator
 
 def _traced_mesh(config: SourceConfig, silhouette: Silhouette, rng: np.random.Generator) -> PolyMesh:
     """The best traced outline for a price of complexity near the one that counts."""
-    dearer = float(np.exp(rng.uniform(*np.log(_TRACED_PRICES))))
-    return make_agent("trace").solve(_simulator(config, silhouette, config.w_sc * dearer)).mesh
+    factor = float(np.exp(rng.uniform(*np.log(_TRACED_PRICES))))
+    return make_agent("trace").solve(_simulator(config, silhouette, config.w_sc * factor)).mesh
 
 
 def _teach(
@@ -134,8 +135,8 @@ def _teach(
     for child in children:
         outcomes[_row(rows, child)] = _parts(child.score)
     gains = np.array([0.0, *(child.score.total - state.score.total for child in children)])
-    odds = np.exp((gains - gains.max()) / config.play_temperature)
-    drawn = int(rng.choice(len(gains), p=odds / odds.sum())) - 1
+    probabilities = np.exp((gains - gains.max()) / config.play_temperature)
+    drawn = int(rng.choice(len(gains), p=probabilities / probabilities.sum())) - 1
     following = children[drawn] if drawn >= 0 else None
     chosen = STOPPED if following is None else _row(rows, following)
     log_residual[:] = _log_residual(simulator, state, actions)
@@ -169,13 +170,13 @@ def _hard(simulator: Simulator, mesh: PolyMesh, taken: Action | None) -> Labelle
     return Labelled(mesh, _parts(state.score), tuple(actions), outcomes, log_residual, chosen)
 
 
-def _log_residual(simulator: Simulator, state: State, actions: Sequence[Action]) -> np.ndarray:
+def _log_residual(simulator: Simulator, state: State, actions: Sequence[Action]) -> FloatArray:
     return np.log(ResidualEvaluator().prior(simulator, state, actions))
 
 
-def _parts(score: Score) -> np.ndarray:
+def _parts(score: Score) -> Float32Array:
     return np.array((score.iou, score.complexity, score.self_intersections), np.float32)
 
 
-def _unknown(n: int) -> tuple[np.ndarray, np.ndarray]:
+def _unknown(n: int) -> tuple[Float32Array, Float32Array]:
     return np.full((n, 3), np.nan, np.float32), np.zeros(n, np.float32)
