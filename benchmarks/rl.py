@@ -22,6 +22,7 @@ from agents.registry import make_agent
 from agents.rl.player import Player
 from agents.rl.weights import load_policy, read_policy_meta
 from agents.solution import Track
+from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import ConfigError
 from autopoly_env.files import write_atomically
 from autopoly_env.score import ScoreWeights
@@ -286,7 +287,7 @@ def _means(results: dict[Case, Found], cases: Sequence[Case], method: str) -> _B
 _SHOWN = ("r_all", "iou", "complexity", "n_refits")
 
 
-def _share(total: np.ndarray, low: np.ndarray, high: np.ndarray) -> Interval:
+def _share(total: FloatArray, low: FloatArray, high: FloatArray) -> Interval:
     """Mean (total - low) over mean (high - low), with the bootstrap's interval: targets are drawn, not their shares."""
     rng = np.random.default_rng(0)
     draws = rng.integers(len(total), size=(2000, len(total)))
