@@ -92,5 +92,5 @@ def check_guidance(agent: Agent, names: Sequence[str]) -> None:
     if names and not agent.takes_guidance:
         raise ConfigError(
             f"{agent.name} finds outlines as a whole and cannot heed {names[0]!r}: choose an agent that plays step by "
-            "step, which are beam, greedy, random and mcts"
+            "step, such as mcts, beam or greedy (docs/guidance.md)"
         )

@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 import yaml
 from pydantic import TypeAdapter, ValidationError
 
+from autopoly_env.arguments import first_defect
 from autopoly_env.errors import ConfigError
 
 _Config = TypeVar("_Config")
@@ -41,6 +42,5 @@ def validated(kind: type[_Config], values: dict[str, Any], what: str = "") -> _C
     try:
         return TypeAdapter(kind).validate_python(values)
     except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(map(str, first["loc"]))
-        raise ConfigError(f"{what}{key}: {first['msg']}, got {first['input']!r}") from None
+        defect = first_defect(error)
+        raise ConfigError(f"{what}{defect}, got {defect.value!r}") from None

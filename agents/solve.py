@@ -35,7 +35,8 @@ and OUT/overview.png shows all meshes, if there are several images.
 
 \b
 Guidance (docs/guidance.md): --importance is for every agent; --start, --lock
-and --symmetry are for those that play step by step: beam, greedy, random, mcts.
+and --symmetry are for those that play step by step: all but trace, climb,
+decimate, dr-simple and dr-complex.
 
 \b
 Printed are the scores, at each image's own resolution, and the picture to open:

@@ -16,6 +16,7 @@ from pydantic import TypeAdapter, ValidationError
 from safetensors import SafetensorError
 from torch import Tensor, nn
 
+from autopoly_env.arguments import first_defect
 from autopoly_env.errors import ConfigError
 from autopoly_env.files import write_atomically
 
@@ -66,7 +67,7 @@ def read_meta(path: Path, meta_class: type[_Meta]) -> _Meta:
     try:
         return TypeAdapter(meta_class).validate_python(fields)
     except ValidationError as error:
-        raise ConfigError(f"{place}: {_first(error)}; expected what the training wrote: get it again") from None
+        raise ConfigError(f"{place}: {first_defect(error)}; expected what the training wrote: get it again") from None
 
 
 def read_tensors(path: Path, meta: WeightsMeta) -> dict[str, Tensor]:
@@ -85,7 +86,7 @@ def settings_of(path: Path, settings_class: type[_Settings], values: Mapping[str
     try:
         return TypeAdapter(settings_class).validate_python(values)
     except ValidationError as error:
-        raise ConfigError(f"{path.with_suffix('.json')}: its settings do not fit ({_first(error)})") from None
+        raise ConfigError(f"{path.with_suffix('.json')}: its settings do not fit ({first_defect(error)})") from None
 
 
 def fill(net: nn.Module, tensors: dict[str, Tensor], where: str) -> None:
@@ -109,8 +110,3 @@ def _read(path: Path, hint: str) -> bytes:
         return path.read_bytes()
     except OSError as error:
         raise ConfigError(f"no weights at {path} ({error.strerror}); {hint}") from None
-
-
-def _first(error: ValidationError) -> str:
-    details = error.errors()[0]
-    return f"{'.'.join(map(str, details['loc']))}: {details['msg']}"

@@ -1,10 +1,14 @@
-"""Checks of arguments that people type, with errors that say what is allowed."""
+"""Checks of values that people type or files hold, with errors that say what is allowed."""
 
-from typing import Any, SupportsFloat, TypeVar
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, SupportsFloat, TypeVar
 
 import numpy as np
 
 from autopoly_env.errors import ConfigError
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
 
 _Value = TypeVar("_Value")
 
@@ -28,3 +32,21 @@ def number(name: str, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, SupportsFloat) or not np.isfinite(float(value)):
         raise ConfigError(f"{name}={value!r}: expected a number")
     return float(value)
+
+
+@dataclass(frozen=True)
+class Defect:
+    """What is wrong with a value: where it stands, what pydantic says of it, and the value itself."""
+
+    place: tuple[int | str, ...]  # names and indices, from the outside inwards
+    problem: str
+    value: Any
+
+    def __str__(self) -> str:
+        return f"{'.'.join(map(str, self.place))}: {self.problem}"
+
+
+def first_defect(error: "ValidationError") -> Defect:
+    """The first of the defects that pydantic has found; as text it is "place: problem", in one line."""
+    details = error.errors(include_url=False)[0]
+    return Defect(details["loc"], details["msg"], details["input"])

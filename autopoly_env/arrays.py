@@ -1,5 +1,7 @@
 """Names for the array types that the signatures of this project use."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,3 +11,4 @@ IntArray = NDArray[np.int64]
 UIntArray = NDArray[np.uint64]
 BoolArray = NDArray[np.bool_]
 ByteArray = NDArray[np.uint8]
+AnyArray = NDArray[Any]

@@ -5,12 +5,10 @@ that is no picture; rows of two come back with `reshape(-1, 2)`.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from autopoly_env.arrays import ByteArray
+from autopoly_env.arrays import AnyArray, ByteArray, FloatArray
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import CAPACITY_PER_VERTEX
@@ -20,7 +18,7 @@ from autopoly_env.silhouette import Silhouette
 PADDING = -1  # of rows without an element
 POSITION_RANGE = (-1.0, 2.0)  # positions are clipped to it; the unit square lies in its middle
 
-Observation = dict[str, npt.NDArray[Any]]
+Observation = dict[str, AnyArray]
 
 
 @dataclass(frozen=True)
@@ -84,13 +82,13 @@ class Observer:
                     f"the mesh's {kind} count is {n}; at most {room} fit max_vertices={self._max_vertices}: raise that"
                 )
 
-    def _padded(self, name: str, rows: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    def _padded(self, name: str, rows: AnyArray) -> AnyArray:
         field = self.fields[name]
         array = np.full(field.shape, PADDING, field.dtype)
         array[: rows.size] = rows.ravel()
         return array
 
 
-def as_bytes(shares: npt.NDArray[np.float64]) -> ByteArray:
+def as_bytes(shares: FloatArray) -> ByteArray:
     """Shares of 0 to 1 as 0 to 255; more than 1, where faces overlap, is 1, less than 0, where they flip, is 0."""
     return (255.0 * np.clip(shares, 0.0, 1.0) + 0.5).astype(np.uint8)

@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 import shapely
 
-from autopoly_env.arrays import IntArray
+from autopoly_env.arrays import FloatArray, IntArray
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh, geometry_kernels
 from autopoly_env.raster import pixels_of, raster_kernels, workspace
@@ -72,7 +72,7 @@ def self_intersections(mesh: PolyMesh) -> int:
     return int(certain) if uncertain == 0 else _robust_count(mesh.vertices[mesh.edges], mesh.edges)
 
 
-def _robust_count(ends: np.ndarray, edges: IntArray) -> int:
+def _robust_count(ends: FloatArray, edges: IntArray) -> int:
     apart = [(i, j) for i, j in combinations(range(len(edges)), 2) if not set(edges[i]) & set(edges[j])]
     is_point = (ends[:, 0] == ends[:, 1]).all(axis=1)  # shapely's lines without length meet nothing
     lines = np.where(is_point, shapely.points(ends[:, 0]), shapely.linestrings(ends))

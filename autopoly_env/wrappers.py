@@ -7,7 +7,7 @@ import numpy as np
 from gymnasium.spaces import Box, Dict, Graph, GraphInstance
 from gymnasium.utils import RecordConstructorArgs
 
-from autopoly_env.arrays import ByteArray
+from autopoly_env.arrays import AnyArray, ByteArray
 from autopoly_env.env import AutoPolyEnv
 from autopoly_env.errors import ConfigError
 from autopoly_env.observation import POSITION_RANGE, Observation
@@ -91,7 +91,7 @@ class GraphObservation(gymnasium.ObservationWrapper[Any, Any, Any], RecordConstr
         return {"graph": graph, **{name: observation[name] for name in ("rendering", "target", "remaining_steps")}}
 
 
-def _values_at(points: np.ndarray[Any, Any], picture: ByteArray) -> np.ndarray[Any, Any]:
+def _values_at(points: AnyArray, picture: ByteArray) -> AnyArray:
     """(V,) 0 to 1: the pixel of a picture (1, R, R) under each point (V, 2); 0 outside."""
     size = picture.shape[-1]
     columns, rows = np.floor(points * size).astype(np.int64).T

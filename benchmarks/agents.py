@@ -11,6 +11,7 @@ import numpy as np
 from agents.base import Agent
 from agents.budget import Budget
 from agents.registry import make_agent
+from autopoly_env.arrays import FloatArray
 from autopoly_env.score import ScoreWeights
 from autopoly_env.silhouette import load_silhouette
 from autopoly_env.simulator import Simulator
@@ -111,7 +112,7 @@ def _summary(solved: Sequence[Solved], has_floors: bool) -> Iterator[Row]:
     yield Row(f"{label}: defects", float(defects), must=NO_DEFECTS, note="self-intersections and flipped faces")
 
 
-def _bootstrap(values: np.ndarray, n: int = 10_000) -> tuple[float, float]:
+def _bootstrap(values: FloatArray, n: int = 10_000) -> tuple[float, float]:
     """95 % interval of the mean: percentiles over resamples of the shapes."""
     rng = np.random.default_rng(0)
     means = rng.choice(values, (n, len(values))).mean(axis=1)

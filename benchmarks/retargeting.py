@@ -20,6 +20,7 @@ from rich.table import Table
 from agents.budget import Budget
 from agents.registry import make_agent
 from agents.retell.retargeting import retarget
+from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import SequenceError
 from autopoly_env.files import write_atomically
 from autopoly_env.silhouette import Silhouette
@@ -129,7 +130,7 @@ def show(pairs: Sequence[Pair], failed: Sequence[str]) -> None:
         console.print(f"failed: {line}")
 
 
-def _bootstrap(after: np.ndarray, fresh: np.ndarray, n: int = 10_000) -> tuple[float, float]:
+def _bootstrap(after: FloatArray, fresh: FloatArray, n: int = 10_000) -> tuple[float, float]:
     """95 % interval of the ratio of the means: percentiles over resamples of the pairs."""
     chosen = np.random.default_rng(0).integers(0, len(after), (n, len(after)))
     low, high = np.percentile(after[chosen].mean(axis=1) / fresh[chosen].mean(axis=1), (2.5, 97.5))

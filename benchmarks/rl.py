@@ -22,6 +22,7 @@ from agents.registry import make_agent
 from agents.rl.player import Player
 from agents.rl.weights import load_policy, read_policy_meta
 from agents.solution import Track
+from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import ConfigError
 from autopoly_env.files import write_atomically
 from autopoly_env.score import ScoreWeights
@@ -29,7 +30,7 @@ from autopoly_env.simulator import Simulator
 from benchmarks.rl_curves import draw_learning, learning_curves
 from benchmarks.search_cases import RESOLUTION, made, target_of
 from training.parallel import map_tasks
-from training.report.statistics import Interval, bootstrap_mean
+from training.report import Interval, bootstrap_mean
 
 PRICES = {"construction": 1.0, "objects": 0.3}  # w_sc of each kind of target, as the environments have it
 N_RANDOM = 20  # random plays, the best of which counts
@@ -286,7 +287,7 @@ def _means(results: dict[Case, Found], cases: Sequence[Case], method: str) -> _B
 _SHOWN = ("r_all", "iou", "complexity", "n_refits")
 
 
-def _share(total: np.ndarray, low: np.ndarray, high: np.ndarray) -> Interval:
+def _share(total: FloatArray, low: FloatArray, high: FloatArray) -> Interval:
     """Mean (total - low) over mean (high - low), with the bootstrap's interval: targets are drawn, not their shares."""
     rng = np.random.default_rng(0)
     draws = rng.integers(len(total), size=(2000, len(total)))
@@ -402,7 +403,7 @@ def curves(
         name, equals, folders = group.partition("=")
         if not (name and equals and folders):
             raise ConfigError(f"{group}: expected NAME=RUN,RUN, such as cloned=runs/a,runs/b")
-        named[name] = [[line for line in _log(Path(folder)) if "exam/final" in line] for folder in folders.split(",")]
+        named[name] = [[line for line in _log(Path(folder)) if "eval/final" in line] for folder in folders.split(",")]
     path = write_atomically(picture, draw_learning(learning_curves(named)))
     print(f"Open {path}")
     return 0
@@ -411,9 +412,14 @@ def curves(
 def _log(run: Path) -> list[dict[str, Any]]:
     try:
         lines = (run / "log.jsonl").read_text(encoding="utf-8").splitlines()
-        return [json.loads(line) for line in lines]
+        return [_renamed(json.loads(line)) for line in lines]
     except (OSError, ValueError):
         raise ConfigError(f"cannot read {run / 'log.jsonl'}; give a folder of training.train_rl") from None
+
+
+def _renamed(line: dict[str, Any]) -> dict[str, Any]:
+    """A line of a log, whose evaluations older runs call exams."""
+    return {f"eval/{key.removeprefix('exam/')}" if key.startswith("exam/") else key: line[key] for key in line}
 
 
 def _shown(interval: Interval, form: str) -> str:

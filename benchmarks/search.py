@@ -18,9 +18,10 @@ from autopoly_env.errors import ConfigError, SilhouetteError
 from autopoly_env.files import write_atomically
 from autopoly_env.silhouette import find_images
 from benchmarks import report, search_rows
-from benchmarks.curve_picture import draw_curves
+from benchmarks.curves import need_matplotlib
 from benchmarks.report import Row
 from benchmarks.search_cases import Case, Records, Results, made
+from benchmarks.search_curves import draw_curves
 
 HELP = """Measure the tree search. Each command prints one table.
 
@@ -126,6 +127,8 @@ def anytime(
     fresh: Fresh = False,
 ) -> None:
     """Mean r_all against refits: mcts, the paper's search, greedy, beam, and the best of random plays."""
+    if picture is not None:
+        need_matplotlib()  # said before hours of measuring
     targets, refits = _targets(folder, limit), _numbers(budgets)
     bench = _Bench(records, workers, fresh)
     totals = search_rows.anytime_results(bench.completer("anytime"), targets, refits)

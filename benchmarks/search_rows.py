@@ -19,7 +19,7 @@ from autopoly_env.compute import set_threads
 from autopoly_env.refit import refit_kernels, tuning
 from benchmarks.report import Must, Row, not_measured
 from benchmarks.search_cases import Case, Results, made, measure, simulator_of, with_options
-from training.report.statistics import Interval, bootstrap_mean
+from training.report import Interval, bootstrap_mean
 
 WEIGHTS = (0.3, 1.0)  # w_sc
 BUDGETS = (50, 100, 200, 400, 1000, 5000)  # refits

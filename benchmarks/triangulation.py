@@ -4,9 +4,9 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from autopoly_env.arrays import FloatArray
+from autopoly_env.arrays import BoolArray, FloatArray
 
-Triangles = tuple[npt.NDArray[np.uint32], npt.NDArray[np.bool_]]
+Triangles = tuple[npt.NDArray[np.uint32], BoolArray]
 
 
 @njit(cache=True)

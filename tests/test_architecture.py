@@ -20,8 +20,8 @@ LINES = [
     ("training", ("autopoly_env", "agents"), ()),
     ("torch", ("autopoly_env",), ("autopoly_env/raster/autograd",)),
     ("gymnasium", ROOMS, (*GYMNASIUM_SHELL, "agents/rl")),
-    ("stable_baselines3", ROOMS, ("agents/rl", "training/train_rl")),
-    ("sb3_contrib", ROOMS, ("agents/rl", "training/train_rl")),
+    ("stable_baselines3", ROOMS, ("agents/rl", "training/train_rl", "training/policies/session")),
+    ("sb3_contrib", ROOMS, ("agents/rl",)),
     ("ray", ROOMS, ("training/parallel",)),
 ]
 

@@ -15,10 +15,10 @@ from agents.search.config import PAPER, MctsConfig
 from autopoly_env.errors import OutputError
 from autopoly_env.refit import refit_kernels
 from benchmarks import search, search_cases, search_rows
-from benchmarks.curve_picture import draw_curves
 from benchmarks.search_cases import Case, Found, Records, Results, best_of_plays, made, target_of
+from benchmarks.search_curves import draw_curves
 from tests.test_agents import simulator
-from training.report.statistics import Interval
+from training.report import Interval
 
 DOCS = Path(__file__).parent.parent / "docs" / "search.md"
 FOUND = Found(80.0, 0.9, 10, 0, 50, 1.5, "finished")
@@ -156,8 +156,9 @@ def test_draw_curves__is_a_picture_with_a_line_for_each_agent_and_weight() -> No
     }
     curves["mcts", 1.0, 5000] = Interval(float("nan"), float("nan"), float("nan"))
     picture = ElementTree.fromstring(draw_curves(curves))
-    lines = [path for path in picture.findall(".//{*}path") if path.get("class") == "line"]
-    assert len(lines) == 4 and "nan" not in draw_curves(curves)
+    lines = [group.get("id") for group in picture.findall(".//{*}g") if (group.get("id") or "").startswith("line ")]
+    assert sorted(filter(None, lines)) == ["line a & b", "line a & b", "line mcts", "line mcts"]
+    assert "nan" not in draw_curves(curves)
     assert {"mcts", "a & b", "50", "5000"} <= {text.text for text in picture.findall(".//{*}text")}
 
 

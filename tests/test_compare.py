@@ -391,6 +391,16 @@ def test_page__takes_names_as_text_whatever_is_in_them(browser: Browser, run: Ru
     assert all(line.count("|") - line.count("\\|") == 12 for line in text.split("\n\n")[0].splitlines())
 
 
+def test_page__has_no_name_unescaped(run: Run, tmp_path: Path) -> None:
+    """As the test before, for where there is no browser; in the page's data, which is JSON, the angle is \\u003c."""
+    records = [*records_of(NASTY, {"x": 1.0}), Record("b", f"y{NASTY.replace('/', '')}", 0, None, NASTY)]
+    write_run(tmp_path / "run", records, {"name": NASTY})
+    assert run("run", "--title", NASTY).code == 0
+    page = Path("report.html").read_text()
+    assert '<b>"it' not in page and "&lt;b&gt;&#34;it&#39;s&#34; &amp; `${1}`" in page
+    assert page.count("<script") == page.count("</script>") == 2 and "\\u003c/script\\u003e" in page
+
+
 def test_odd_records__are_compared_like_any_other(run: Run, tmp_path: Path) -> None:
     """Names that are no Unicode, no curve, no elements at all, vertices far out."""
     far = MeshData.of(PolyMesh.rectangle(-1e300, -1e300, 1e300, 1e300))

@@ -256,6 +256,14 @@ def test_kill__at_any_moment_loses_and_repeats_nothing(run: Run) -> None:
     assert table("killed") == table("whole")
 
 
+def test_run__goes_on_when_a_row_says_something_else_of_what_is_missing(run: Run) -> None:
+    assert run("tiny.yaml", "--out", "out", "--set", "targets.n=1").code == 0
+    text = Path("tiny.yaml").read_text()
+    Path("tiny.yaml").write_text(text.replace("no weights yet", "gone to Delphi"))
+    done = run("tiny.yaml", "--out", "out", "--set", "targets.n=1", "--resume")
+    assert done.code == 0 and "gone to Delphi" in done.out
+
+
 def test_ctrl_c__leaves_a_run_to_go_on_with() -> None:
     Path("tiny.yaml").write_text(SUITE.replace("n: 3", "n: 2000"))
     command = [sys.executable, "-m", "training.evaluate", "tiny.yaml", "--out", "out"]

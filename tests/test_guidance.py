@@ -2,6 +2,7 @@
 
 import pickle
 import random
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from agents.budget import Budget, Meter
 from agents.finish import finish
 from agents.registry import AGENTS, make_agent
 from agents.solution import Solution
-from agents.solve import main
+from agents.solve import HELP, main
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import ConfigError, IllegalActionError, MeshError
 from autopoly_env.export import from_obj, load_obj, to_obj
@@ -452,6 +453,18 @@ def test_agents_that_find_wholes__take_importance_and_nothing_else(name: str) ->
 def test_every_agent__says_whether_it_takes_guidance() -> None:
     for name in set(AGENTS) & {*PLAYERS, *WHOLE}:
         assert make_agent(name).takes_guidance == (name in PLAYERS)
+
+
+def test_help_and_docs__name_the_agents_that_take_no_guidance_and_no_other() -> None:
+    """The policies have no weights here, or no torch; they play step by step, too."""
+    made = [make_agent(name) for name in set(AGENTS) - {"ppo", "a2c", "dqn"}]
+    whole = {agent.name for agent in made if not agent.takes_guidance}
+    docs = (Path(__file__).parents[1] / "docs" / "guidance.md").read_text(encoding="utf-8")
+    players, _, others = docs.partition(" play step by step, and every step")
+    assert set(re.findall(r"`([\w-]+)`", others.partition(" find outlines as a whole")[0])) == whole
+    assert set(re.findall(r"`([\w-]+)`", players.rpartition("\n\n")[2])) == set(AGENTS) - whole
+    named = " ".join(HELP.split()).partition("all but ")[2].partition(".")[0]
+    assert set(re.split(", | and ", named)) == whole
 
 
 FLIPPED = PolyMesh.from_faces([(0.2, 0.2), (0.2, 0.8), (0.8, 0.8), (0.8, 0.2)], [(0, 1, 2, 3)])

@@ -22,7 +22,7 @@ from autopoly_env.files import write_atomically
 from autopoly_env.targets import ConstructionTargets
 from tests.commands import Run, runner
 from tests.shapes import shapely_coverage
-from training.datasets.build import MAX_N, MAX_SEED, SPLITS, Settings, build_dataset
+from training.datasets.build import MAX_N, MAX_SEED, SEEDS, DatasetSettings, build_dataset
 from training.datasets.shards import Example, checksum, pack, read_manifest, read_shards, unpack
 from training.make_dataset import main
 
@@ -84,14 +84,14 @@ def test_target__depends_on_seed_and_number_alone(run: Run) -> None:
 def test_source_seeds__of_different_seeds_and_splits_do_not_meet() -> None:
     """Every (split, seed) has MAX_N source seeds in a row: it is enough that their ends keep order."""
     ranges = []
-    for split in SPLITS:
+    for split in SEEDS:
         for seed in range(MAX_SEED + 1):
-            settings = Settings("constructions", split, seed)
+            settings = DatasetSettings("constructions", split, seed)
             ranges.append((settings.source_seed(0), settings.source_seed(MAX_N - 1)))
     assert all(last - first == MAX_N - 1 for first, last in ranges)
     ranges.sort()
     assert all(last < first for (_, last), (first, _) in pairwise(ranges))
-    train, test = Settings("objects", "train", 0), Settings("objects", "test", MAX_SEED)
+    train, test = DatasetSettings("objects", "train", 0), DatasetSettings("objects", "test", MAX_SEED)
     assert (train.source_seed(0), test.source_seed(MAX_N - 1)) == (0, 2**31 + 2**30 - 1)
 
 
@@ -162,7 +162,9 @@ def test_killed_run__leaves_only_whole_shards_and_goes_on(run: Run, tmp_path: Pa
     assert 10 <= len(there) < 4000
     n = read_manifest("data").n
     assert n == 4000
-    assert all(same(example, Settings("constructions", resolution=64).example(example.index)) for example in there[:3])
+    assert all(
+        same(example, DatasetSettings("constructions", resolution=64).example(example.index)) for example in there[:3]
+    )
 
 
 def damage(path: Path) -> None:
@@ -380,7 +382,7 @@ def test_engine__gives_back_every_shard_as_it_is_done(tmp_path: Path) -> None:
     """What `build_dataset` tells its caller is what is on the disk."""
     from training.datasets.build import begin_dataset
 
-    settings = Settings("constructions", resolution=64)
+    settings = DatasetSettings("constructions", resolution=64)
     manifest = begin_dataset(tmp_path, settings, 4, 2, resume=False, fresh=False)
     told: list[str] = []
     build_dataset(

@@ -33,7 +33,8 @@ from autopoly_env.score import ScoreWeights
 from autopoly_env.simulator import Simulator
 from tests.drawings import BOTTLE, FRAME, HOUSE, painted
 from training.networks.labelling import SourceConfig
-from training.networks.samples import LabelConfig, Live, NfapStream, collate
+from training.networks.samples import LabelConfig
+from training.networks.streams import Live, NfapStream, collate
 
 torch.set_num_threads(1)  # as tests run beside each other
 

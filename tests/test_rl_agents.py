@@ -10,7 +10,7 @@ import torch
 
 from agents.budget import Budget
 from agents.registry import AGENTS, make_agent
-from agents.rl.config import NetConfig, Rules
+from agents.rl.config import NetConfig, SpaceSpec
 from agents.rl.network import MeshNet
 from agents.rl.player import Player
 from agents.rl.weights import load_policy, save_policy
@@ -23,14 +23,14 @@ from training import evaluate
 
 torch.set_num_threads(1)  # as tests run beside each other
 
-RULES = Rules(max_vertices=16, obs_resolution=32, max_steps=6)
+SPEC = SpaceSpec(max_vertices=16, obs_resolution=32, max_steps=6)
 NAMES = ("ppo", "maskable-ppo", "a2c", "dqn")
 
 
-def policy(seed: int = 0, rules: Rules = RULES) -> MeshNet:
+def policy(seed: int = 0, spec: SpaceSpec = SPEC) -> MeshNet:
     """One that has its own mind, and does not stop at once."""
     torch.manual_seed(seed)
-    net = MeshNet(NetConfig(widths=(4, 4, 4), width=8, n_rounds=1), rules)
+    net = MeshNet(NetConfig(widths=(4, 4, 4), width=8, n_rounds=1), spec)
     for parameter in net.action_net.parameters():
         torch.nn.init.normal_(parameter, std=0.5)
     torch.nn.init.constant_(net.action_net.stop[-1].bias, -5.0)
@@ -121,7 +121,7 @@ def test_seed__decides_what_is_sampled(weights: str) -> None:
 def test_policy__stops_after_as_many_steps_as_it_was_trained_to_take(weights: str) -> None:
     agent, simulator = make_agent("ppo", weights=weights), game()
     state = simulator.initial()
-    for _ in range(RULES.max_steps):
+    for _ in range(SPEC.max_steps):
         state = simulator.idle(state)
     assert agent.act(simulator, state).action == STOP
 
@@ -237,8 +237,8 @@ def test_evaluate__measures_them_beside_the_others(
 ) -> None:
     suite = tmp_path / "mine.yaml"
     entries = [f"  - {{agent: {name}, options: {{weights: {weights}}}}}" for name in (*NAMES, "rl-prior")]
-    rules = "targets: {kind: construction, n: 1, resolution: 64}\nresolution: 32\nbudget: {refits: 12}\nagents:\n"
-    suite.write_text(rules + "\n".join([*entries, "  - {agent: random}"]))
+    spec = "targets: {kind: construction, n: 1, resolution: 64}\nresolution: 32\nbudget: {refits: 12}\nagents:\n"
+    suite.write_text(spec + "\n".join([*entries, "  - {agent: random}"]))
     assert evaluate.main([str(suite), "--out", str(tmp_path / "run"), "--engine", "serial", "--quiet", "--json"]) == 0
     rows = [json.loads(line) for line in capsys.readouterr().out.splitlines() if line.startswith("{")]
     assert [row["agent"] for row in rows][1:] == [*NAMES, "rl-prior", "random"]

@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from agents.rl.config import NetConfig, Rules
+from agents.rl.config import NetConfig, SpaceSpec
 from agents.rl.network import MeshNet
 from agents.rl.weights import save_policy
 from benchmarks import rl
@@ -50,7 +50,7 @@ def test_records__keep_what_was_measured_and_leave_out_half_a_line(
 
 
 def test_figures__of_an_untrained_policy(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    net = MeshNet(NetConfig((4, 4, 4), 8, 1), Rules(max_vertices=24, obs_resolution=32, max_steps=3))
+    net = MeshNet(NetConfig((4, 4, 4), 8, 1), SpaceSpec(max_vertices=24, obs_resolution=32, max_steps=3))
     path = save_policy(tmp_path / "p.safetensors", net, "ppo", {}, {})
     methods = (rl.RECTANGLE, rl.ONE_PASS, rl.PARED, rl.EQUAL)
     measured = {m: rl.measure(Case("construction:0", m, str(path), "", 8)) for m in methods}
@@ -65,10 +65,10 @@ def test_figures__of_an_untrained_policy(tmp_path: Path, capsys: pytest.CaptureF
 
 def test_throughput_and_curves__are_read_from_logs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     shares = {"train/share_env": 0.5, "train/share_inference": 0.2, "train/share_update": 0.3}
-    lines = [
+    lines = [  # the first evaluation is of an older version, which called it an exam
         {"step": 6000, "train/steps_per_second": 500.0, "train/minutes": 0.2, **shares},
         {"step": 6000, "exam/final": 71.0, "exam/minutes": 0.2, "exam/objects_start": 60.0, "exam/objects_final": 71.0},
-        {"step": 9000, "exam/final": 75.0, "exam/minutes": 0.3, "exam/objects_start": 60.0, "exam/objects_final": 75.0},
+        {"step": 9000, "eval/final": 75.0, "eval/minutes": 0.3, "eval/objects_start": 60.0, "eval/objects_final": 75.0},
     ]
     (tmp_path / "log.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines))
     assert rl.main(["throughput", str(tmp_path)]) == 0
@@ -84,7 +84,7 @@ def test_throughput_and_curves__are_read_from_logs(tmp_path: Path, capsys: pytes
 def test_curves__are_medians_and_ranges_over_the_seeds() -> None:
     def run(*values: float) -> list[dict[str, float]]:
         return [
-            {"exam/minutes": float(k), "exam/objects_start": 60.0, "exam/objects_final": value}
+            {"eval/minutes": float(k), "eval/objects_start": 60.0, "eval/objects_final": value}
             for k, value in enumerate(values)
         ]
 

@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from agents.rl import reading
-from agents.rl.config import NetConfig, Rules
+from agents.rl.config import NetConfig, SpaceSpec
 from agents.rl.links import averaged, links_of, summed
 from agents.rl.network import NEVER, MeshNet, observer_of
 from agents.rl.player import observation_of
@@ -18,8 +18,8 @@ from autopoly_env.operators import OPERATORS, ActionCodec
 
 torch.set_num_threads(1)  # as tests run beside each other
 
-RULES = Rules(max_vertices=16, obs_resolution=32, max_steps=8)
-CODEC = ActionCodec(RULES.operators, RULES.max_vertices)
+SPEC = SpaceSpec(max_vertices=16, obs_resolution=32, max_steps=8)
+CODEC = ActionCodec(SPEC.operators, SPEC.max_vertices)
 TARGET = np.zeros((1, 32, 32), np.uint8)
 TARGET[0, 8:28, 5:20] = 255
 # Two quads side by side and a triangle on top of the right one.
@@ -30,14 +30,14 @@ FACES = [(0, 1, 4, 5), (1, 2, 3, 4), (1, 6, 2)]
 def network(seed: int = 0) -> MeshNet:
     """One whose heads say something."""
     torch.manual_seed(seed)
-    net = MeshNet(NetConfig(widths=(6, 8, 8), width=16), RULES)
+    net = MeshNet(NetConfig(widths=(6, 8, 8), width=16), SPEC)
     for parameter in net.action_net.parameters():
         torch.nn.init.normal_(parameter, std=0.5)
     return net.eval()
 
 
 def batch_of(meshes: Sequence[PolyMesh], w_sc: float = 0.3) -> dict[str, Any]:
-    observer = observer_of(RULES)
+    observer = observer_of(SPEC)
     seen = [observation_of(observer.observe(m, TARGET, 5), CODEC.legal_mask(m), w_sc) for m in meshes]
     return {name: torch.from_numpy(np.stack([one[name] for one in seen])) for name in seen[0]}
 
@@ -76,7 +76,7 @@ def actions_in(new: PolyMesh, new_vertex: np.ndarray, new_face: np.ndarray, old_
         "hole": [2 * new_face[k // 2] + k % 2 for k in range(2 * len(FACES))],
     }
     start = 1
-    for name in RULES.operators:
+    for name in SPEC.operators:
         kind = OPERATORS[name].element
         for before, after in enumerate(moved[kind.name]):
             order[start + int(after)] = start + before
@@ -168,7 +168,7 @@ def test_near_points__lie_on_both_sides_of_the_edge() -> None:
 @pytest.mark.parametrize(
     ("other", "complaint"),
     [
-        ({"operators": Rules().operators[:4]}, "operators paper; .*operators full"),
+        ({"operators": SpaceSpec().operators[:4]}, "operators paper; .*operators full"),
         ({"max_vertices": 20}, "max_vertices 20; .*max_vertices 48"),
         ({"obs_resolution": 32}, "obs_resolution 32; .*obs_resolution 64"),
         ({"max_steps": 3}, "max_steps 3; .*max_steps 24"),
@@ -176,4 +176,4 @@ def test_near_points__lie_on_both_sides_of_the_edge() -> None:
 )
 def test_rules__that_differ_are_both_named(other: dict[str, Any], complaint: str) -> None:
     with pytest.raises(ConfigError, match=complaint):
-        Rules().check_same(Rules(**other), "this run", "theirs")
+        SpaceSpec().check_same(SpaceSpec(**other), "this run", "theirs")

@@ -16,7 +16,8 @@ from stable_baselines3.common.vec_env import SubprocVecEnv
 
 from agents.registry import make_agent
 from agents.rl.algorithms import MaskedDqn, make_model
-from agents.rl.envs import N_SEEDS, Course, NativeVecEnv, Table, make_vec_env
+from agents.rl.config import Rules, SpaceSpec, TaskSpec
+from agents.rl.envs import EnvFactory, NativeVecEnv, make_vec_env
 from agents.rl.network import NEVER, MeshNet, observer_of
 from agents.rl.player import Player
 from agents.rl.policies import net_of, put_net
@@ -26,16 +27,20 @@ from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import ActionCodec
 from autopoly_env.score import ScoreWeights
 from autopoly_env.simulator import Simulator
+from autopoly_env.targets import HELD_OUT, LEARNING
 from training import rl_clone, train_rl
 from training.networks.labelling import SourceConfig, build_trajectory
-from training.networks.samples import LabelConfig, collate, stored
-from training.networks.trainer import Place, train
+from training.networks.samples import LabelConfig
+from training.networks.streams import collate, stored
+from training.networks.trainer import Process, train
 from training.networks.trajectories import Shard, Trajectory
 from training.options import read_config
 from training.policies import export as rl_export
-from training.policies.config import OptimConfig, TrainRlConfig
-from training.policies.exam import HELD_OUT, Exam, exams_of, mean_final, play_all, sit_all
-from training.rl_clone import CloneConfig, CloneTask, prepared, sample_of, turned
+from training.policies import training_log
+from training.policies.clone_samples import CloneConfig, clone_sample, prepared, turned_observation
+from training.policies.config import LearningRateConfig, TrainRlConfig
+from training.policies.evaluation import Evaluation, evaluate, evaluations_of, mean_final, play_all
+from training.rl_clone import CloneTask
 
 torch.set_num_threads(1)  # as tests run beside each other
 
@@ -74,12 +79,12 @@ def rows(folder: Path, group: str) -> list[dict[str, float]]:
 # --- environments ---
 
 
-def table() -> Table:
-    return Table(config().env.rules(), resolution=32)
+def factory() -> EnvFactory:
+    return EnvFactory(config().env.spec(), resolution=32)
 
 
-def test_practice__is_the_environment_with_mask_and_price() -> None:
-    env = table().make(Course("objects", w_sc=0.3))
+def test_training_environment__is_the_environment_with_mask_and_price() -> None:
+    env = factory().make(TaskSpec("objects", w_sc=0.3))
     seen, info = env.reset(seed=3)
     assert env.observation_space.contains(seen)
     assert np.array_equal(seen["action_mask"], info["action_mask"]) and seen["price"].tolist() == [np.float32(0.3)]
@@ -90,12 +95,12 @@ def test_practice__is_the_environment_with_mask_and_price() -> None:
         assert not truncated  # the steps that are left are in the observation
         rewards += reward
     assert rewards == pytest.approx(0.1 * (info["r_all"] - total)) == pytest.approx(info["episode"]["r"])
-    assert info["episode"]["l"] == 5 and int(info["target"].rpartition("_")[2]) < N_SEEDS
+    assert info["episode"]["l"] == 5 and int(info["target"].rpartition("_")[2]) in LEARNING
 
 
 def test_native_environments__do_what_each_does_alone() -> None:
-    many = make_vec_env(table(), [Course(), Course("objects", 0.3)], 4, "native", seed=5)
-    alone = [table().make((Course(), Course("objects", 0.3))[k % 2]) for k in range(4)]
+    many = make_vec_env(factory(), [TaskSpec(), TaskSpec("objects", 0.3)], 4, "native", seed=5)
+    alone = [factory().make((TaskSpec(), TaskSpec("objects", 0.3))[k % 2]) for k in range(4)]
     seen = many.reset()
     starts = [env.reset(seed=5 + k)[0] for k, env in enumerate(alone)]
     rng = np.random.default_rng(0)
@@ -114,9 +119,9 @@ def test_native_environments__do_what_each_does_alone() -> None:
 
 
 def test_processes__do_the_same_as_one() -> None:
-    courses = [Course(difficulty=(1, 2))]
-    native = make_vec_env(table(), courses, 2, "native", seed=1)
-    workers = make_vec_env(table(), courses, 2, "subproc", seed=1)
+    courses = [TaskSpec(difficulty=(1, 2))]
+    native = make_vec_env(factory(), courses, 2, "native", seed=1)
+    workers = make_vec_env(factory(), courses, 2, "subproc", seed=1)
     try:
         assert isinstance(workers, SubprocVecEnv)
         first, second = native.reset(), workers.reset()
@@ -134,7 +139,7 @@ def test_processes__do_the_same_as_one() -> None:
 
 
 def test_target__comes_as_often_as_it_is_to_be_played() -> None:
-    env = Table(table().rules, resolution=32, n_plays=3).make(Course())
+    env = EnvFactory(factory().spec, resolution=32, n_plays=3).make(TaskSpec())
     starts = [env.reset(seed=2), *(env.reset() for _ in range(3))]
     targets = [info["target"] for _, info in starts]
     assert targets[0] == targets[1] == targets[2] != targets[3]
@@ -143,7 +148,7 @@ def test_target__comes_as_often_as_it_is_to_be_played() -> None:
 
 
 def test_curriculum__draws_easy_constructions_first() -> None:
-    env = table().make(Course(difficulty=(1, 5)))
+    env = factory().make(TaskSpec(difficulty=(1, 5)))
     env.set_difficulty(1)
     env.reset(seed=0)
     assert env.unwrapped.targets.source.difficulty == (1, 1)
@@ -167,14 +172,14 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 def test_algorithm__trains_and_its_agent_plays(name: str, trained: dict[str, Path]) -> None:
     folder = trained[name]
     net, meta = load_policy(folder / "policy.safetensors")
-    exams = rows(folder, "exam")
+    exams = rows(folder, "eval")
     assert meta.algorithm == name and [row["step"] for row in exams] == [128, 256]
-    assert meta.metrics["final"] == max(row["exam/final"] for row in exams)
-    silhouette = exams_of(config().env, 1, 32)[0].simulators[0].silhouette
+    assert meta.metrics["final"] == max(row["eval/final"] for row in exams)
+    silhouette = evaluations_of(config().env, 1, 32)[0].simulators[0].silhouette
     simulator = Simulator(silhouette, resolution=32, weights=ScoreWeights(w_sc=1.0))
     agent = make_agent(name.replace("_", "-"), weights=str(folder / "policy.safetensors"))
     assert agent.solve(simulator).score.total >= simulator.final_score(simulator.initial().mesh).total
-    fresh = MeshNet(net.config, net.rules)
+    fresh = MeshNet(net.config, net.spec)
     torch.manual_seed(0)
     assert any(not torch.equal(a, b) for a, b in zip(net.parameters(), fresh.parameters(), strict=True))
 
@@ -182,7 +187,7 @@ def test_algorithm__trains_and_its_agent_plays(name: str, trained: dict[str, Pat
 @pytest.mark.parametrize("name", ALGORITHMS)
 def test_algorithm__never_takes_an_illegal_action(name: str) -> None:
     settings = config(f"algorithm={name}", "dqn.exploration_final_eps=0.9")
-    envs = make_vec_env(table(), [Course()], 4, "native", seed=0)
+    envs = make_vec_env(factory(), [TaskSpec()], 4, "native", seed=0)
     taken: list[bool] = []
 
     def noted(actions: Any, step: Any = envs.step_async) -> None:
@@ -192,7 +197,7 @@ def test_algorithm__never_takes_an_illegal_action(name: str) -> None:
 
     envs.step_async = noted  # type: ignore[method-assign]
     model = make_model(
-        name, envs, settings.net, settings.env.rules(), lambda _: 1e-3, asdict(settings.options()), 0, "cpu"
+        name, envs, settings.net, settings.env.spec(), lambda _: 1e-3, asdict(settings.options()), 0, "cpu"
     )
     model.learn(128)
     assert len(taken) == 128 and all(taken)
@@ -206,9 +211,9 @@ def test_algorithm__never_takes_an_illegal_action(name: str) -> None:
 
 def test_dqn__hopes_for_legal_actions_only() -> None:
     settings = config("algorithm=dqn")
-    envs = make_vec_env(table(), [Course()], 2, "native", seed=0)
+    envs = make_vec_env(factory(), [TaskSpec()], 2, "native", seed=0)
     model: Any = make_model(
-        "dqn", envs, settings.net, settings.env.rules(), lambda _: 1e-3, asdict(settings.dqn), 0, "cpu"
+        "dqn", envs, settings.net, settings.env.spec(), lambda _: 1e-3, asdict(settings.dqn), 0, "cpu"
     )
     assert isinstance(model, MaskedDqn)
     seen = {name: torch.from_numpy(array) for name, array in envs.reset().items()}
@@ -220,11 +225,11 @@ def test_dqn__hopes_for_legal_actions_only() -> None:
 @pytest.mark.parametrize("name", ALGORITHMS)
 def test_network_of_a_policy__is_the_policy(name: str) -> None:
     settings = config(f"algorithm={name}")
-    envs = make_vec_env(table(), [Course()], 2, "native", seed=0)
+    envs = make_vec_env(factory(), [TaskSpec()], 2, "native", seed=0)
     model: Any = make_model(
-        name, envs, settings.net, settings.env.rules(), lambda _: 1e-3, asdict(settings.options()), 0, "cpu"
+        name, envs, settings.net, settings.env.spec(), lambda _: 1e-3, asdict(settings.options()), 0, "cpu"
     )
-    net = MeshNet(settings.net, settings.env.rules())
+    net = MeshNet(settings.net, settings.env.spec())
     for parameter in net.parameters():
         torch.nn.init.normal_(parameter, std=0.3)
     put_net(model.policy, net)
@@ -245,7 +250,7 @@ def test_network_of_a_policy__is_the_policy(name: str) -> None:
 def test_log__says_where_the_time_went(
     trained: dict[str, Path], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(train_rl, "_LOG_EVERY", 100)
+    monkeypatch.setattr(training_log, "LOG_EVERY", 100)
     train_rl.train_rl(config(), tmp_path)
     row = rows(tmp_path, "train")[-1]
     shares = [row[f"train/share_{part}"] for part in ("env", "inference", "update")]
@@ -283,7 +288,7 @@ def test_killed_run__goes_on_to_its_end(
     end = train_rl.train_rl(settings, tmp_path)
     assert "goes on at step 256" in capsys.readouterr().out
     assert end.step >= 384
-    steps = [row["step"] for row in rows(tmp_path, "exam")]
+    steps = [row["step"] for row in rows(tmp_path, "eval")]
     assert steps == sorted(set(steps)) and steps[-1] == end.step
     once_more = train_rl.train_rl(settings, tmp_path)  # there is nothing left to do
     assert once_more.step == end.step
@@ -319,17 +324,37 @@ def test_init__takes_over_the_network(trained: dict[str, Path]) -> None:
     net = train_rl.initial_net(config(f"run.init={path}"), trust=False)
     assert all(torch.equal(a, b) for a, b in zip(net.parameters(), load_policy(path)[0].parameters(), strict=True))
     zipped = train_rl.initial_net(config(f"run.init={trained['dqn'] / 'checkpoint.zip'}"), trust=False)
-    assert zipped.rules == net.rules
+    assert zipped.spec == net.spec
+
+
+def test_zip_of_an_older_version__can_be_begun_with_and_loaded(trained: dict[str, Path], tmp_path: Path) -> None:
+    """The spaces were "rules" then, in the note and in what is pickled."""
+    path = tmp_path / "checkpoint.zip"
+    with zipfile.ZipFile(trained["ppo"] / "checkpoint.zip") as new, zipfile.ZipFile(path, "w") as old:
+        for name in new.namelist():
+            content = new.read(name)
+            if name == "autopoly.json":
+                note = json.loads(content)
+                content = json.dumps({**note, "rules": note.pop("spec")}).encode()
+            old.writestr(name, content)
+    net = train_rl.initial_net(config(f"run.init={path}"), trust=False)
+    model = PPO.load(trained["ppo"] / "checkpoint.zip", device="cpu")
+    model.policy_kwargs["rules"] = Rules(**asdict(model.policy_kwargs.pop("spec")))
+    model.save(path)
+    again = PPO.load(path, device="cpu")
+    assert net.spec == net_of(again.policy).spec == SpaceSpec(max_vertices=16, obs_resolution=32, max_steps=5)
+    zipped = train_rl.initial_net(config(f"run.init={path}"), trust=True)
+    assert all(torch.equal(a, b) for a, b in zip(net.parameters(), zipped.parameters(), strict=True))
 
 
 def test_run_from_a_policy__is_never_worse_than_it(trained: dict[str, Path], tmp_path: Path) -> None:
     path = trained["maskable_ppo"] / "policy.safetensors"
     settings = config(f"run.init={path}", "run.total_steps=128")
-    standing = train_rl.train_rl(settings, tmp_path)
-    given = mean_final(sit_all(exams_of(settings.env, 1, 32), load_policy(path)[0]))
-    exams = rows(tmp_path, "exam")
-    assert exams[0]["step"] == 0 and exams[0]["exam/final"] == pytest.approx(given) and len(exams) > 1
-    assert standing.best == max(exam["exam/final"] for exam in exams)
+    state = train_rl.train_rl(settings, tmp_path)
+    given = mean_final(evaluate(evaluations_of(settings.env, 1, 32), load_policy(path)[0]))
+    exams = rows(tmp_path, "eval")
+    assert exams[0]["step"] == 0 and exams[0]["eval/final"] == pytest.approx(given) and len(exams) > 1
+    assert state.best == max(exam["eval/final"] for exam in exams)
 
 
 @pytest.mark.parametrize("file", ["policy.safetensors", "checkpoint.zip"])
@@ -388,7 +413,7 @@ def test_command__trains_and_exports(
         (["algorithm=sarsa"], "algorithm"),
         (["ppo.n_stepz=3"], "unknown option 'n_stepz'"),
         (["ppo.batch_size=0"], "batch_size = 0: expected at least 2"),
-        (["run.n_envs=1"], "1 environments for 2 courses"),
+        (["run.n_envs=1"], "1 environments for 2 tasks"),
         (["env.operators=melt"], "operators 'melt' are unknown"),
         (["env.courses=[{targets: nowhere}]"], "nowhere"),
         (["run.init=nowhere.safetensors"], "no weights at nowhere"),
@@ -415,19 +440,19 @@ def test_shipped_config__can_be_read_and_begins_with_its_command(name: str) -> N
         assert read.algorithm == name
 
 
-# --- examination ---
+# --- evaluation ---
 
 
 def test_learning_rate__rises_and_falls() -> None:
-    optim = OptimConfig(lr=1.0, last=0.1, warmup=0.1)
+    optim = LearningRateConfig(lr=1.0, last=0.1, warmup=0.1)
     assert [round(optim.lr_at(done), 3) for done in (0.0, 0.05, 0.1, 0.55, 1.0)] == [0.02, 0.5, 1.0, 0.55, 0.1]
 
 
-def test_exam__is_of_held_out_targets_and_plays_as_the_agent_does(trained: dict[str, Path]) -> None:
+def test_evaluation__is_of_held_out_targets_and_plays_as_the_agent_does(trained: dict[str, Path]) -> None:
     path = trained["maskable_ppo"] / "policy.safetensors"
-    exams = exams_of(config().env, 2, 32)
+    exams = evaluations_of(config().env, 2, 32)
     assert [exam.name for exam in exams] == ["construction", "objects"]
-    assert int(exams[0].simulators[1].silhouette.name.rpartition("_")[2]) == HELD_OUT + 1
+    assert int(exams[0].simulators[1].silhouette.name.rpartition("_")[2]) == HELD_OUT[1]
     player = Player(load_policy(path)[0])
     for path_of_states, simulator in zip(play_all(player, exams[0].simulators), exams[0].simulators, strict=True):
         state = simulator.initial()
@@ -435,7 +460,7 @@ def test_exam__is_of_held_out_targets_and_plays_as_the_agent_does(trained: dict[
             ranked = player.ranked(simulator, state)
             assert following.action in ranked
             state = following
-    assert isinstance(exams[0], Exam)
+    assert isinstance(exams[0], Evaluation)
 
 
 # --- cloning ---
@@ -475,9 +500,9 @@ def clone_config(shards: Path, *overrides: str) -> CloneConfig:
 
 def test_sample__has_the_gains_at_its_price(trajectory: Trajectory, shards: Path) -> None:
     settings = clone_config(shards)
-    one = prepared(trajectory, settings.env.rules())[0]
+    one = prepared(trajectory, settings.env.spec())[0]
     for w_sc in (0.3, 1.0):
-        sample = sample_of(one, w_sc, 0, settings)
+        sample = clone_sample(one, w_sc, 0, settings)
         gains = LabelConfig(w_sc=w_sc).gains(one.state)
         for action, gain, number in zip(one.state.actions, gains, one.index, strict=True):
             assert sample["action_mask"][number] == 1, action
@@ -492,31 +517,31 @@ def test_sample__has_the_gains_at_its_price(trajectory: Trajectory, shards: Path
 @pytest.mark.parametrize("way", range(8))
 def test_turned_sample__is_what_the_turned_mesh_shows(way: int, trajectory: Trajectory, shards: Path) -> None:
     settings = clone_config(shards)
-    one = prepared(trajectory, settings.env.rules())[-1]
-    sample = sample_of(one, 1.0, way, settings)
+    one = prepared(trajectory, settings.env.spec())[-1]
+    sample = clone_sample(one, 1.0, way, settings)
     n_vertices, n_edges, _, n_corners = one.seen["counts"].tolist()
     points = sample["vertices"].reshape(-1, 2)[:n_vertices].astype(float)
     corners = sample["faces"].reshape(-1, 2)[:n_corners]
     faces = [tuple(corners[corners[:, 0] == f, 1].tolist()) for f in range(int(one.seen["counts"][2]))]
     mesh = PolyMesh.from_faces(points, faces)  # which refuses areas that are not positive
-    seen = observer_of(settings.env.rules()).observe(mesh, sample["target"], 5)
+    seen = observer_of(settings.env.spec()).observe(mesh, sample["target"], 5)
     assert np.array_equal(seen["edges"], sample["edges"]) and np.array_equal(seen["faces"], sample["faces"])
     assert np.abs(seen["rendering"].astype(int) - sample["rendering"]).max() <= 1
-    rules = settings.env.rules()
-    assert np.array_equal(ActionCodec(rules.operators, rules.max_vertices).legal_mask(mesh), sample["action_mask"] > 0)
-    assert set(turned(one.seen, way)) == set(one.seen) and n_edges > 0
+    spec = settings.env.spec()
+    assert np.array_equal(ActionCodec(spec.operators, spec.max_vertices).legal_mask(mesh), sample["action_mask"] > 0)
+    assert set(turned_observation(one.seen, way)) == set(one.seen) and n_edges > 0
 
 
 def test_clone__learns_goes_on_and_can_be_begun_with(shards: Path, tmp_path: Path) -> None:
     task = CloneTask(clone_config(shards))
     with torch.no_grad():
         before = task.measure(torch.device("cpu"))
-    train(task, task.config.optim, task.config.run, {"any": 1}, tmp_path, Place())
+    train(task, task.config.optim, task.config.run, {"any": 1}, tmp_path, Process())
     with torch.no_grad():
         after = task.measure(torch.device("cpu"))
     assert after["choice"] < 0.8 * before["choice"] and after["value"] < before["value"]
     assert after["gain_share"] > before["gain_share"]
-    path = rl_clone.finish_clone(task, tmp_path)
+    path = rl_clone.finish_clone(task, {"any": 1}, tmp_path, torch.device("cpu"))
     net, meta = load_policy(path)
     assert meta.algorithm == "clone" and meta.metrics["choice"] == pytest.approx(after["choice"])
     assert train_rl.initial_net(config(f"run.init={path}"), trust=False).config == net.config
@@ -541,7 +566,7 @@ def test_samples__can_be_collated(shards: Path) -> None:
 
 def test_weights__are_written_and_read_back(tmp_path: Path) -> None:
     settings = config()
-    net = MeshNet(settings.net, settings.env.rules())
+    net = MeshNet(settings.net, settings.env.spec())
     again, meta = load_policy(save_policy(tmp_path / "p.safetensors", net, "clone", {"a": 1}, {"b": 2.0}))
-    assert again.rules == net.rules and meta.training == {"a": 1} and meta.metrics == {"b": 2.0}
+    assert again.spec == net.spec and meta.training == {"a": 1} and meta.metrics == {"b": 2.0}
     assert issubclass(ConfigError, AutoPolyError) and replace(settings, algorithm="ppo").options() == settings.ppo

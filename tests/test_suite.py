@@ -13,7 +13,7 @@ from agents.registry import AGENTS
 from autopoly_env.errors import ConfigError
 from autopoly_env.score import ScoreWeights
 from training.evaluation.suite import FOLDER, GROUND_TRUTH, Printed, chosen, find_suite, task_seed, with_budget
-from training.evaluation.tasks import Curve, Task, solve_task
+from training.evaluation.tasks import Curve, EvalTask, solve_task
 from training.options import plain
 
 SUITES = sorted(path.stem for path in FOLDER.glob("*.yaml"))
@@ -170,7 +170,7 @@ SEED_OF_A = 912898483  # the same on every machine
 def test_ground_truth__renders_exactly_and_pays_for_its_complexity() -> None:
     suite = find_suite("paper", ["targets.n=3"])
     for target in suite.targets.targets():
-        outcome = solve_task(suite, Task(GROUND_TRUTH, target, 0)).record.outcome
+        outcome = solve_task(suite, EvalTask(GROUND_TRUTH, target, 0)).record.outcome
         assert outcome is not None
         assert outcome.r_sm == 1.0
         assert outcome.r_all == 100.0 - outcome.r_sc

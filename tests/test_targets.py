@@ -19,6 +19,8 @@ from autopoly_env.raster import coverage
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.targets import (
+    HELD_OUT,
+    LEARNING,
     SPLITS,
     ConstructionTargets,
     FolderTargets,
@@ -92,6 +94,11 @@ def test_splits__share_no_seed_and_use_them_all() -> None:
     assert split_seed("test", 0) == 2**31
     assert split_seed("test", 2**31 - 1) == 2**32 - 1
     assert SPLITS["train"][-1] < SPLITS["test"][0]
+
+
+def test_train_split__is_what_is_learnt_from_and_then_what_is_held_out() -> None:
+    assert (LEARNING, HELD_OUT) == (range(2**30), range(2**30, 2**31))
+    assert [*LEARNING[:1], *HELD_OUT[-1:]] == [SPLITS["train"][0], SPLITS["train"][-1]]
 
 
 @pytest.mark.parametrize("split", ["train", "test"])

@@ -22,18 +22,9 @@ from autopoly_env.simulator import Simulator
 from training import make_expert, train_nfap, train_warpnet
 from training.networks import finish
 from training.networks.labelling import SourceConfig, build_trajectory
-from training.networks.samples import (
-    LabelConfig,
-    Live,
-    NfapStream,
-    WarpStream,
-    batches,
-    collate,
-    nfap_sample,
-    stored,
-    turned,
-)
-from training.networks.trainer import OptimConfig, Place, RunConfig, train
+from training.networks.samples import LabelConfig, nfap_sample, turned
+from training.networks.streams import Live, NfapStream, WarpStream, batches, collate, stored
+from training.networks.trainer import OptimConfig, Process, RunConfig, train
 from training.networks.trajectories import STOPPED, Shard, Trajectory
 from training.options import read_config
 
@@ -393,14 +384,14 @@ RUN = RunConfig(n_workers=0, eval_every=2, patience=3, seed=17)
 
 
 def test_run__stops_early_where_the_held_out_loss_does_not_fall(tmp_path: Path) -> None:
-    train(Dull(1.0), OptimConfig(n_steps=100, batch_size=2), RUN, {}, tmp_path, Place())
+    train(Dull(1.0), OptimConfig(n_steps=100, batch_size=2), RUN, {}, tmp_path, Process())
     measured = [line["step"] for line in lines(tmp_path) if "held_out/loss" in line]
     assert measured == [2, 4, 6, 8]  # the first is the best, three more are not better
 
 
 def test_run__names_the_samples_of_a_loss_that_is_no_number(tmp_path: Path) -> None:
     with pytest.raises(RunError, match=r"loss is nan at step 0 \(loss, part\): samples 0\.\.1 of seed 17"):
-        train(Dull(float("nan")), OptimConfig(n_steps=100, batch_size=2), RUN, {}, tmp_path, Place())
+        train(Dull(float("nan")), OptimConfig(n_steps=100, batch_size=2), RUN, {}, tmp_path, Process())
 
 
 def test_warpnet__is_trained_and_exported(shards: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

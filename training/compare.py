@@ -7,15 +7,14 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
 from agents.commands.running import run_command
 from autopoly_env.errors import ConfigError
 from autopoly_env.files import write_atomically
 from training.report.comparison import Row, read_runs, rows_of
+from training.report.headline import SCREEN_HEADS, markdown_report, record_of, screen_lines
 from training.report.page import page_html
-from training.report.tables import FORMATS, as_record, csv_table, duel, markdown_table, plain
+from training.report.table import as_csv, as_rich
 
 HELP = """Compare the agents of one or more runs of training.evaluate.
 
@@ -63,8 +62,8 @@ def compare(
     rows = rows_of(comparison)
     page = page_html(comparison, rows, gallery, title)
     texts = {
-        out.with_suffix(".md"): markdown_table(rows, comparison.baseline, comparison.notes),
-        out.with_suffix(".csv"): csv_table(rows),
+        out.with_suffix(".md"): markdown_report(rows, comparison.baseline, comparison.notes),
+        out.with_suffix(".csv"): as_csv([record_of(row) for row in rows]),
         out: page,
     }
     for path, text in texts.items():
@@ -74,7 +73,7 @@ def compare(
         messages.print(f"warning: {note}", markup=False, highlight=False, emoji=False, soft_wrap=True)
     if as_json:
         for row in rows:
-            print(json.dumps(as_record(row), allow_nan=False))
+            print(json.dumps(record_of(row), allow_nan=False))
     elif not quiet:
         _print_table(rows)
         Console().print(f"Open {out}", markup=False, highlight=False, emoji=False, soft_wrap=True)
@@ -85,18 +84,8 @@ def _print_table(rows: list[Row]) -> None:
     console = Console()
     if not console.is_terminal:
         console.width = PLAIN_WIDTH
-    table = Table(caption="means over targets [95 % interval]", caption_style="dim", box=None, pad_edge=False)
-    table.add_column("agent", overflow="fold")
-    for head in ("targets", *FORMATS, "won–tied–lost"):
-        table.add_column(head, justify="right")
-    for row in rows:
-        n_targets = f"{row.n_targets}" + (f" ({row.n_failed} failed)" if row.n_failed else "")
-        means = [
-            plain(row.means[name], form) if name == "r_all" else plain(row.means[name], form).split(" [")[0]
-            for name, form in FORMATS.items()
-        ]
-        table.add_row(Text(row.label), n_targets, *means, "baseline" if row.is_baseline else duel(row))
-    console.print(table)
+    console.print(as_rich(SCREEN_HEADS, screen_lines(rows)))
+    console.print("Means over targets with 95 % bootstrap intervals.", style="dim", highlight=False)
 
 
 def main(arguments: list[str] | None = None) -> int:

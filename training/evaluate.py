@@ -76,7 +76,7 @@ def evaluate(
 ) -> int:
     """Check what can be checked before the work, do it, show the table; return the exit code."""
     from training.evaluation.folder import merge as merge_runs
-    from training.evaluation.run import Machines, Shard, run_suite
+    from training.evaluation.run import Machines, TargetShard, run_suite
 
     _check_flags(suite, resume=resume, fresh=fresh, merge=merge)
     if merge:
@@ -84,7 +84,7 @@ def evaluate(
         merge_runs([Path(part) for part in suite], folder, fresh=fresh)
         return _finish(folder, baseline, as_json)
     found, only = _read(suite[0], override or [], budget, agents, baseline)
-    part = Shard.parse(shard)
+    part = TargetShard.parse(shard)
     folder = out or FOLDER / (found.name + (f"-{part.k}of{part.n}" if part.n > 1 else ""))
     machines = Machines(engine, workers, ray_address)
     try:
@@ -124,8 +124,9 @@ def _finish(folder: Path, baseline: str | None, as_json: bool) -> int:
     from rich.console import Console
 
     from training.evaluation.folder import suite_of
-    from training.evaluation.table import as_records, as_rich, table_of, write_tables
+    from training.evaluation.table import HEADS, lines_of, records_of, table_of, write_tables
     from training.records import read_info, read_records
+    from training.report.table import as_rich
 
     info, records = read_info(folder), read_records(folder)
     suite = suite_of(info, folder)
@@ -133,13 +134,13 @@ def _finish(folder: Path, baseline: str | None, as_json: bool) -> int:
     table = table_of(suite, records, info.targets, suite.missing(), baseline)
     write_tables(folder, table)
     if as_json:
-        for row in as_records(table):
+        for row in records_of(table):
             print(json.dumps(row, allow_nan=False))
     else:
         console = Console()
         if not console.is_terminal:
             console.width = PLAIN_WIDTH
-        console.print(as_rich(table))
+        console.print(as_rich(HEADS, lines_of(table)))
         for line in (*table.notes, f"Open {folder / 'table.md'}"):
             console.print(line, markup=False, highlight=False, emoji=False, soft_wrap=True)
     n_failed = sum(record.outcome is None for record in records)

@@ -25,7 +25,7 @@ Examples:
   python -m training.make_dataset silhouettes ShapeNetCore.v2 --categories chair,lamp --split test --out data/shapenet
 
 What was killed goes on with --resume. Target number i depends on --seed and i alone: neither --workers nor
---shard-size nor --n changes it. No two seeds or splits share a target. Read with training.datasets.shards.read_shards.
+--shard-size nor --n changes it. No two seeds or splits share a target. Read with training.datasets.read_shards.
 
 Exit codes: 0 all is well, 1 something failed, 2 wrong usage, 130 Ctrl-C.
 """
@@ -73,9 +73,9 @@ def constructions(
     quiet: Quiet = False,
 ) -> int:
     """Shapes of the random construction simulator, with the sequences that made them."""
-    from training.datasets.build import Settings
+    from training.datasets.build import DatasetSettings
 
-    settings = Settings("constructions", split, seed, resolution, _range(difficulty), operators)
+    settings = DatasetSettings("constructions", split, seed, resolution, _range(difficulty), operators)
     machines = {"engine": engine, "n_workers": workers, "address": ray_address}
     return _build(settings, out, n, shard_size, machines, resume, fresh, quiet)
 
@@ -97,9 +97,9 @@ def objects(
     quiet: Quiet = False,
 ) -> int:
     """Drawings of man-made things; how to construct them is not known."""
-    from training.datasets.build import Settings
+    from training.datasets.build import DatasetSettings
 
-    settings = Settings("objects", split, seed, resolution, families=families)
+    settings = DatasetSettings("objects", split, seed, resolution, families=families)
     machines = {"engine": engine, "n_workers": workers, "address": ray_address}
     return _build(settings, out, n, shard_size, machines, resume, fresh, quiet)
 

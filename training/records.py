@@ -15,6 +15,7 @@ from typing import Any, TypeGuard
 
 from pydantic import TypeAdapter, ValidationError
 
+from autopoly_env.arguments import first_defect
 from autopoly_env.errors import OutputError, RunError
 from autopoly_env.files import write_atomically
 from autopoly_env.mesh import PolyMesh
@@ -98,8 +99,7 @@ class Record:
         try:
             return _RECORD.validate_python({**values, "outcome": None if is_failed else outcome})
         except ValidationError as error:
-            first = error.errors()[0]
-            raise ValueError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from None
+            raise ValueError(str(first_defect(error))) from None
 
 
 OUTCOME_FIELDS = tuple(field.name for field in fields(Outcome))

@@ -5,9 +5,9 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from PIL import Image
 
+from autopoly_env.arrays import ByteArray
 from autopoly_env.errors import RunError
 from autopoly_env.files import write_atomically
 
@@ -41,8 +41,8 @@ class RunLog:
                 self._board.add_scalar(name, value, step)
             self._board.flush()
 
-    def picture(self, step: int, pixels: np.ndarray) -> None:
-        """Keep a picture (H, W) or (H, W, 3), uint8."""
+    def picture(self, step: int, pixels: ByteArray) -> None:
+        """Keep a picture (H, W) or (H, W, 3)."""
         buffer = BytesIO()
         Image.fromarray(pixels).save(buffer, "PNG")
         write_atomically(self._folder / "pictures" / f"step_{step:06d}.png", buffer.getvalue())

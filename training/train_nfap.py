@@ -12,29 +12,28 @@ report.json and nfap.safetensors; --export makes these the weights that come wit
 
 import sys
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import torch
-import typer
 from torch import Tensor, nn
 
-from agents.commands.running import GOES_ON, run_command
 from agents.guided.config import NfapConfig
 from agents.guided.nfap import Foresight, NfapLabels, NfapNet, loss_terms
+from training.networks.command import ConfigFile, Export, Folder, Overrides, new_app, run_training, train_network
 from training.networks.finish import finish_run
 from training.networks.metrics import mean_rows, nfap_metrics
 from training.networks.pictures import draw_nfap
-from training.networks.samples import Batch, HeldOut, LabelConfig, NfapStream
-from training.networks.trainer import OptimConfig, RunConfig, place_of, train
-from training.options import plain, read_config
-from training.settings import DataConfig
+from training.networks.samples import LabelConfig
+from training.networks.streams import Batch, DataConfig, HeldOut, NfapStream
+from training.networks.trainer import OptimConfig, RunConfig
 
 N_DRAWN = 6  # samples in a picture of the log
 
 
 @dataclass(frozen=True)
-class LossWeights:
+class NfapLossWeights:
     """Of the terms of nFAP-Net's loss. The paper has no choice and all others at 1, its pictures summed over pixels."""
 
     image: float = 10.0
@@ -50,7 +49,7 @@ class TrainNfapConfig:
     net: NfapConfig = field(default_factory=NfapConfig)
     data: DataConfig = field(default_factory=DataConfig)
     labels: LabelConfig = field(default_factory=LabelConfig)
-    loss: LossWeights = field(default_factory=LossWeights)
+    loss: NfapLossWeights = field(default_factory=NfapLossWeights)
     optim: OptimConfig = field(default_factory=OptimConfig)
     run: RunConfig = field(default_factory=RunConfig)
 
@@ -58,7 +57,7 @@ class TrainNfapConfig:
 class NfapLosses(nn.Module):
     """A batch to the terms of its loss."""
 
-    def __init__(self, net: NfapNet, weights: LossWeights, run: RunConfig) -> None:
+    def __init__(self, net: NfapNet, weights: NfapLossWeights, run: RunConfig) -> None:
         super().__init__()
         self.net, self.weights, self.run = net, weights, run
 
@@ -67,14 +66,14 @@ class NfapLosses(nn.Module):
         return self.terms(self.foresee(batch), batch)
 
     def foresee(self, batch: Batch) -> Foresight:
-        """What the network says, in half precision where the run wants it."""
+        """What the network foresees, in half precision where the run wants it."""
         with self.run.half_precision(batch["pictures"].device):
-            said: Foresight = self.net(batch["pictures"])
-        return said
+            foresight: Foresight = self.net(batch["pictures"])
+        return foresight
 
-    def terms(self, said: Foresight, batch: Batch) -> dict[str, Tensor]:
-        """The terms of what the network has said."""
-        terms = loss_terms(self.net, said, NfapLabels.of(batch))
+    def terms(self, foresight: Foresight, batch: Batch) -> dict[str, Tensor]:
+        """The terms of the network's outputs."""
+        terms = loss_terms(self.net, foresight, NfapLabels.of(batch))
         weighted = [getattr(self.weights, name) * term for name, term in terms.items()]
         return {"loss": torch.stack(weighted).sum(), **terms}
 
@@ -98,9 +97,9 @@ class NfapTask:
         """Loss, its terms and how good the priors are, on the held-out samples."""
         rows = []
         for batch in self._held_out.batches(device):
-            said = self.losses.foresee(batch)
-            terms = {name: float(term) for name, term in self.losses.terms(said, batch).items()}
-            rows.append({**terms, **nfap_metrics(self.net, said, batch)})
+            foresight = self.losses.foresee(batch)
+            terms = {name: float(term) for name, term in self.losses.terms(foresight, batch).items()}
+            rows.append({**terms, **nfap_metrics(self.net, foresight, batch)})
         return mean_rows(rows)
 
     def draw(self, device: torch.device) -> Any:
@@ -121,28 +120,23 @@ The same command goes on with a run that was stopped. At the end the folder has 
 See docs/learning.md, and the first lines of this script for more than one machine.
 """
 
-app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+app = new_app()
 
 
 @app.command(help=HELP)
 def main_command(
-    overrides: Annotated[list[str] | None, typer.Argument(metavar="SECTION.KEY=VALUE")] = None,
-    config: Annotated[Path | None, typer.Option(help="A YAML file; what it leaves out is at its default.")] = None,
-    out: Annotated[Path, typer.Option(help="The run's folder.")] = Path("runs/nfap"),
-    export: Annotated[bool, typer.Option("--export", help="Make the result the project's own weights.")] = False,
+    overrides: Overrides = None,
+    config: ConfigFile = None,
+    out: Folder = Path("runs/nfap"),
+    export: Export = False,
 ) -> int:
-    settings = read_config(config, overrides or [], TrainNfapConfig())
-    with place_of(settings.run) as place:
-        task = NfapTask(settings)
-        train(task, settings.optim, settings.run, plain(settings), out, place)
-        if place.leads:
-            finish_run(task, plain(settings), out, place.device, export)
+    train_network(TrainNfapConfig(), overrides, config, out, NfapTask, partial(finish_run, export=export))
     return 0
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; returns the exit code."""
-    return run_command(app, arguments, "python -m training.train_nfap", stopped=GOES_ON)
+    return run_training(app, arguments, "training.train_nfap")
 
 
 if __name__ == "__main__":

@@ -12,30 +12,28 @@ report.json and warpnet.safetensors; --export makes these the weights that come 
 
 import sys
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import torch
-import typer
 from torch import Tensor, nn
 
-from agents.commands.running import GOES_ON, run_command
 from agents.guided.config import WarpConfig
 from agents.guided.warp import Theta, Warp, WarpNet, loss_terms
 from autopoly_env.errors import ConfigError
+from training.networks.command import ConfigFile, Export, Folder, Overrides, new_app, run_training, train_network
 from training.networks.finish import finish_run
 from training.networks.metrics import mean_rows, warp_metrics
 from training.networks.pictures import draw_warp
-from training.networks.samples import Batch, HeldOut, WarpStream
-from training.networks.trainer import OptimConfig, RunConfig, place_of, train
-from training.options import plain, read_config
-from training.settings import DataConfig
+from training.networks.streams import Batch, DataConfig, HeldOut, WarpStream
+from training.networks.trainer import OptimConfig, RunConfig
 
 N_DRAWN = 8  # samples in a picture of the log
 
 
 @dataclass(frozen=True)
-class LossWeights:
+class WarpLossWeights:
     """Of the terms of WarpNet's loss. The paper has the image's term only."""
 
     image: float = 1.0
@@ -50,7 +48,7 @@ class TrainWarpnetConfig:
     net: WarpConfig = field(default_factory=WarpConfig)
     data: DataConfig = field(default_factory=DataConfig)
     placed_share: float = 1.0  # of samples whose new vertices begin at the disagreement; the others' do on the edge
-    loss: LossWeights = field(default_factory=LossWeights)
+    loss: WarpLossWeights = field(default_factory=WarpLossWeights)
     optim: OptimConfig = field(default_factory=OptimConfig)
     run: RunConfig = field(default_factory=RunConfig)
 
@@ -62,7 +60,7 @@ class TrainWarpnetConfig:
 class WarpLosses(nn.Module):
     """A batch to the terms of its loss."""
 
-    def __init__(self, net: WarpNet, weights: LossWeights, run: RunConfig) -> None:
+    def __init__(self, net: WarpNet, weights: WarpLossWeights, run: RunConfig) -> None:
         super().__init__()
         self.net, self.weights, self.run = net, weights, run
 
@@ -76,8 +74,8 @@ class WarpLosses(nn.Module):
 
     def _think(self, pictures: Tensor) -> Theta:
         with self.run.half_precision(pictures.device):
-            said: Theta = self.net(pictures)
-        return said
+            theta: Theta = self.net(pictures)
+        return theta
 
     def terms(self, warps: list[Warp]) -> dict[str, Tensor]:
         """The terms of what has become of them."""
@@ -128,33 +126,23 @@ The same command goes on with a run that was stopped. At the end the folder has 
 See docs/learning.md, and the first lines of this script for more than one machine.
 """
 
-app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+app = new_app()
 
 
 @app.command(help=HELP)
 def main_command(
-    overrides: Annotated[list[str] | None, typer.Argument(metavar="SECTION.KEY=VALUE")] = None,
-    config: Annotated[Path | None, typer.Option(help="A YAML file; what it leaves out is at its default.")] = None,
-    out: Annotated[Path, typer.Option(help="The run's folder.")] = Path("runs/warpnet"),
-    export: Annotated[bool, typer.Option("--export", help="Make the result the project's own weights.")] = False,
+    overrides: Overrides = None,
+    config: ConfigFile = None,
+    out: Folder = Path("runs/warpnet"),
+    export: Export = False,
 ) -> int:
-    settings = read_config(config, overrides or [], TrainWarpnetConfig())
-    with place_of(settings.run) as place:
-        task = WarpTask(settings)
-        train(task, settings.optim, settings.run, plain(settings), out, place)
-        if place.leads:
-            finish_run(task, plain(settings), out, place.device, export)
+    train_network(TrainWarpnetConfig(), overrides, config, out, WarpTask, partial(finish_run, export=export))
     return 0
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; returns the exit code."""
-    return run_command(
-        app,
-        arguments,
-        "python -m training.train_warpnet",
-        stopped=GOES_ON,
-    )
+    return run_training(app, arguments, "training.train_warpnet")
 
 
 if __name__ == "__main__":

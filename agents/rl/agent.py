@@ -31,7 +31,7 @@ class RlAgent(Agent):
     def act(self, simulator: Simulator, state: State) -> Decision:
         """The likeliest action, or one that is drawn."""
         config = self._config
-        if state.step >= self._player.rules.max_steps:
+        if state.step >= self._player.spec.max_steps:
             return Decision(STOP)
         action = self._player.ranked(simulator, state, self._rng(0, state.step), config.temperature)[0]
         return Decision(action, self._player.probabilities(simulator, state, config.temperature))
@@ -70,14 +70,14 @@ def rl_prior(config: RlPriorConfig, incumbents: Sequence[Agent] = ()) -> Agent:
     return RlPriorAgent(config, incumbents, RlEvaluator(player, config.temperature))
 
 
-def _player(who: str, whose: str, weights: str) -> "Player":
-    """The policy in a file, or that of the agent `whose`. Keeps torch to this process's threads."""
-    require("learn", f"agent {who!r}", "safetensors", "torch")
+def _player(name: str, owner: str, weights: str) -> "Player":
+    """The policy in a file, or the one that comes with agent `owner`. Keeps torch to this process's threads."""
+    require("learn", f"agent {name!r}", "safetensors", "torch")
     import torch
 
     from agents.rl.player import Player
     from agents.rl.weights import file_of, load_policy
 
     torch.set_num_threads(n_threads())
-    net, _ = load_policy(file_of(whose, weights))
-    return Player(net, who)
+    net, _ = load_policy(file_of(owner, weights))
+    return Player(net, name)

@@ -21,10 +21,11 @@ from stable_baselines3.common.vec_env import VecEnv
 from torch import Tensor
 
 from agents.options import validated
-from agents.rl.config import NetConfig, Rules
+from agents.rl.config import NetConfig, SpaceSpec
 from agents.rl.network import MeshNet
 from agents.rl.policies import PARTS, MaskablePointerPolicy, PointerDqnPolicy, PointerPolicy
 from agents.weights_file import fill
+from autopoly_env.arrays import AnyArray
 from autopoly_env.errors import ConfigError, RunError
 from autopoly_env.files import write_atomically
 
@@ -49,7 +50,7 @@ class MaskedDqn(DQN):
             return actions, actions
         return super()._sample_action(learning_starts, action_noise, n_envs)
 
-    def _random(self, masks: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    def _random(self, masks: AnyArray) -> AnyArray:
         """(B,) a legal action for each row of masks (B, n_actions)."""
         return np.argmax(np.random.rand(*masks.shape) * (masks > 0), axis=-1)
 
@@ -74,7 +75,7 @@ def make_model(
     name: str,
     envs: VecEnv,
     net: NetConfig,
-    rules: Rules,
+    spec: SpaceSpec,
     lr: Callable[[float], float],
     options: dict[str, Any],
     seed: int,
@@ -87,7 +88,7 @@ def make_model(
             algorithm.policy,
             envs,
             learning_rate=lr,
-            policy_kwargs={"net": net, "rules": rules},
+            policy_kwargs={"net": net, "spec": spec},
             seed=seed,
             device=device,
             **options,
@@ -131,7 +132,7 @@ def load_checkpoint(path: Path, model: BaseAlgorithm, note: dict[str, Any]) -> N
 
 
 def net_of_zip(path: Path, net: MeshNet, trust: bool) -> None:
-    """Fill a network with what a zip of SB3 holds, which must be of the same network and rules.
+    """Fill a network with what a zip of SB3 holds, which must be of the same network and spaces.
 
     A zip without our note is refused unless `trust`: what it is for stands in its pickled part alone, and unpickling
     can run any code. Raises ConfigError.
@@ -145,9 +146,9 @@ def net_of_zip(path: Path, net: MeshNet, trust: bool) -> None:
     try:
         data, params, _ = load_from_zip_file(str(path), load_data=note is None, device="cpu")
         kwargs = data["policy_kwargs"] if note is None else note  # type: ignore[index]
-        rules, config = kwargs["rules"], kwargs["net"]
+        spec, config = kwargs["spec" if "spec" in kwargs else "rules"], kwargs["net"]  # "rules" in older zips
         if note is not None:
-            rules = validated(Rules, rules)
+            spec = validated(SpaceSpec, spec)
             config = validated(NetConfig, config)
         policy: Any = params["policy"]
         tensors = _network_of(policy)
@@ -155,7 +156,7 @@ def net_of_zip(path: Path, net: MeshNet, trust: bool) -> None:
         raise ConfigError(
             f"{path}: no policy of this project ({type(error).__name__}: {error}); give another"
         ) from None
-    net.rules.check_same(rules, "this run", str(path))
+    net.spec.check_same(spec, "this run", str(path))
     if config != net.config:
         raise ConfigError(f"{path}: a network {config}; this run: {net.config}: make them agree")
     fill(net, tensors, str(path))

@@ -1,4 +1,4 @@
-"""What the policy network and the agents that use it can be told; nothing here needs torch.
+"""Settings of environments, of the policy network and of the agents that use it; nothing here needs torch.
 
 Letters: N `max_vertices`, R pixels a side of the observed pictures.
 """
@@ -9,6 +9,7 @@ from typing import Any, Literal
 from agents.search.config import MctsConfig
 from autopoly_env.errors import ConfigError
 from autopoly_env.operators import preset
+from autopoly_env.targets import ConstructionTargets, TargetSource, make_targets
 
 # What policies are trained with by default: frozen, so that weights and observations stay what they are.
 OPERATORS = (
@@ -37,8 +38,8 @@ class NetConfig:
 
 
 @dataclass(frozen=True)
-class Rules:
-    """What a policy was made for: where it plays these must be the same."""
+class SpaceSpec:
+    """The observation and action spaces that a policy was made for: where it plays they must be the same."""
 
     operators: tuple[str, ...] = OPERATORS
     max_vertices: int = 48  # N
@@ -54,20 +55,43 @@ class Rules:
                 f"obs_resolution {self.obs_resolution}: expected a multiple of 16, 16 to 256 pixels a side"
             )
 
-    def check_same(self, other: "Rules", ours: str, theirs: str) -> None:
+    def check_same(self, other: "SpaceSpec", ours: str, theirs: str) -> None:
         """Raise ConfigError, which names both settings, unless `other`, of `theirs`, is what these, of `ours`, are."""
         for name, value in vars(self).items():
             found = getattr(other, name)
             if found != value:
                 raise ConfigError(f"{theirs}: {name} {_shown(found)}; {ours}: {name} {_shown(value)}: make them agree")
 
-    def check_operators(self, operators: tuple[str, ...], who: str) -> None:
+    def check_operators(self, operators: tuple[str, ...], name: str) -> None:
         """Raise ConfigError, which names both, unless the policy knows some of these operators; others are masked."""
         if not set(operators) & set(self.operators):
             raise ConfigError(
-                f"{who} was trained with operators {_shown(self.operators)} and knows none of {_shown(operators)}: "
+                f"{name} was trained with operators {_shown(self.operators)} and knows none of {_shown(operators)}: "
                 f"give operators={_shown(self.operators)} or other weights"
             )
+
+
+Rules = SpaceSpec  # by which name the pickled part of older zips of Stable-Baselines3 knows it
+
+
+@dataclass(frozen=True)
+class TaskSpec:
+    """What is to be built in an environment, and at which price."""
+
+    targets: str = "construction"  # "construction", "objects" or a folder of images
+    w_sc: float = 1.0  # price of an element, in points of r_all
+    difficulty: tuple[int, int] = (1, 5)  # of constructions: how many actions change the outline
+    operators: str = "paper"  # that constructions are made with
+
+    def __post_init__(self) -> None:
+        if not self.w_sc >= 0.0:
+            raise ConfigError(f"w_sc {self.w_sc}: expected a price of at least 0")
+
+    def source(self, difficulty: tuple[int, int] | None = None) -> TargetSource:
+        """The targets; constructions may have another difficulty. Raises ConfigError."""
+        if self.targets == "construction":
+            return ConstructionTargets(difficulty or self.difficulty, self.operators)
+        return make_targets(self.targets)
 
 
 def _shown(value: Any) -> str:

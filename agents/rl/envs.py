@@ -6,7 +6,7 @@ last state is worth nothing more, and nothing is bootstrapped.
 
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any, cast
 
 import gymnasium
@@ -14,21 +14,21 @@ import numpy as np
 from gymnasium import spaces
 from stable_baselines3.common.vec_env import SubprocVecEnv, VecEnv
 
-from agents.rl.config import Rules
+from agents.rl.config import SpaceSpec, TaskSpec
 from agents.rl.player import observation_of
+from autopoly_env.arrays import AnyArray
 from autopoly_env.compute import Routine, run, run_all, set_threads
 from autopoly_env.env import AutoPolyEnv, EnvState
 from autopoly_env.errors import ConfigError
 from autopoly_env.observation import Observation
 from autopoly_env.silhouette import Silhouette
-from autopoly_env.targets import ConstructionTargets, TargetSource, make_targets
+from autopoly_env.targets import LEARNING, TargetSource
 
-N_SEEDS = 2**30  # targets to learn from; those from here on are held out, as `training.make_expert` has it
 _HIGHEST_PRICE = 1e6
 
 
 @dataclass(frozen=True)
-class _Learned:
+class _LearningTargets:
     """A source whose held-out targets never come up."""
 
     source: TargetSource
@@ -38,59 +38,43 @@ class _Learned:
         return self.source.name
 
     def sample(self, seed: int) -> Silhouette:
-        return self.source.sample(seed % N_SEEDS)
+        return self.source.sample(LEARNING[seed % len(LEARNING)])
 
 
 @dataclass(frozen=True)
-class Course:
-    """What is built in an environment, and for which price."""
+class EnvFactory:
+    """Makes environments to learn in; its fields are what all those of a training have in common."""
 
-    targets: str = "construction"  # "construction", "objects" or a folder of images
-    w_sc: float = 1.0  # price of an element, in points of r_all
-    difficulty: tuple[int, int] = (1, 5)  # of constructions: how many actions change the outline
-    operators: str = "paper"  # of constructions
-
-    def source(self, difficulty: tuple[int, int] | None = None) -> TargetSource:
-        """The targets. Raises ConfigError."""
-        if self.targets == "construction":
-            return ConstructionTargets(difficulty or self.difficulty, self.operators)
-        return make_targets(self.targets)
-
-
-@dataclass(frozen=True)
-class Table:
-    """What all environments of a training have in common."""
-
-    rules: Rules
+    spec: SpaceSpec
     resolution: int = 64  # pixels a side at which meshes are fitted and scored
     reward_scale: float = 0.1  # reward of a point of r_all
     illegal_penalty: float = 1.0  # points of r_all
     n_plays: int = 1  # episodes with a target before the next one comes, which takes longer than a step
 
-    def make(self, course: Course) -> "Practice":
-        """An environment. Raises ConfigError."""
-        rules = self.rules
+    def make(self, task: TaskSpec) -> "TrainingEnv":
+        """An environment for a task. Raises ConfigError."""
+        spec = self.spec
         env = AutoPolyEnv(
-            targets=_Learned(course.source()),
-            operators=",".join(rules.operators),
+            targets=_LearningTargets(task.source()),
+            operators=",".join(spec.operators),
             resolution=self.resolution,
-            obs_resolution=rules.obs_resolution,
-            max_steps=rules.max_steps,
-            max_vertices=rules.max_vertices,
+            obs_resolution=spec.obs_resolution,
+            max_steps=spec.max_steps,
+            max_vertices=spec.max_vertices,
             match_threshold=1.0,
             reward_mode="improvement",
             illegal_penalty=self.illegal_penalty,
-            w_sc=course.w_sc,
+            w_sc=task.w_sc,
         )
-        return Practice(env, course, self.reward_scale, self.n_plays)
+        return TrainingEnv(env, task, self.reward_scale, self.n_plays)
 
 
-class Practice(gymnasium.Wrapper[Observation, Any, Observation, Any]):
+class TrainingEnv(gymnasium.Wrapper[Observation, Any, Observation, Any]):
     """An environment to learn in; see the module. `info["episode"]` at an end is what SB3's Monitor would say."""
 
-    def __init__(self, env: AutoPolyEnv, course: Course, reward_scale: float, n_plays: int = 1) -> None:
+    def __init__(self, env: AutoPolyEnv, task: TaskSpec, reward_scale: float, n_plays: int = 1) -> None:
         super().__init__(env)
-        self._inner, self._course, self._reward_scale = env, course, reward_scale
+        self._inner, self._task, self._reward_scale = env, task, reward_scale
         boxes = dict(env.observation_space.spaces)  # type: ignore[attr-defined]
         more: dict[str, gymnasium.Space[Any]] = {
             "action_mask": spaces.Box(0, 1, (env.codec.n_actions,), np.int8),
@@ -137,18 +121,18 @@ class Practice(gymnasium.Wrapper[Observation, Any, Observation, Any]):
         gymnasium.Env.reset(self._inner, seed=seed)
         self._first = None
 
-    def action_masks(self) -> np.ndarray[Any, Any]:
+    def action_masks(self) -> AnyArray:
         """(n_actions,) bool, which actions are legal now."""
         return self._inner.action_masks()
 
     def set_difficulty(self, most: int) -> None:
         """Draw constructions of at most this difficulty from now on."""
-        if self._course.targets == "construction":
-            low, high = self._course.difficulty
-            self._inner.targets = _Learned(self._course.source((min(low, most), min(high, most))))
+        if self._task.targets == "construction":
+            low, high = self._task.difficulty
+            self._inner.targets = _LearningTargets(self._task.source((min(low, most), min(high, most))))
 
     def _seen(self, observation: Observation, info: dict[str, Any]) -> Observation:
-        return observation_of(observation, info["action_mask"].astype(np.bool_), self._course.w_sc)
+        return observation_of(observation, info["action_mask"].astype(np.bool_), self._task.w_sc)
 
 
 class NativeVecEnv(VecEnv):
@@ -157,13 +141,13 @@ class NativeVecEnv(VecEnv):
     `seconds` is the time spent in them.
     """
 
-    def __init__(self, envs: Sequence[Practice]) -> None:
+    def __init__(self, envs: Sequence[TrainingEnv]) -> None:
         self.envs = list(envs)
         self.seconds = 0.0
         self._actions: list[int] = []
         super().__init__(len(self.envs), self.envs[0].observation_space, self.envs[0].action_space)
 
-    def reset(self) -> dict[str, np.ndarray[Any, Any]]:
+    def reset(self) -> dict[str, AnyArray]:
         began = time.perf_counter()
         for env, seed in zip(self.envs, self._seeds, strict=True):
             if seed is not None:
@@ -175,10 +159,10 @@ class NativeVecEnv(VecEnv):
         self.seconds += time.perf_counter() - began
         return _stacked([observation for observation, _ in starts])
 
-    def step_async(self, actions: np.ndarray[Any, Any]) -> None:
+    def step_async(self, actions: AnyArray) -> None:
         self._actions = [int(action) for action in actions]
 
-    def step_wait(self) -> tuple[Any, np.ndarray[Any, Any], np.ndarray[Any, Any], list[dict[str, Any]]]:
+    def step_wait(self) -> tuple[Any, AnyArray, AnyArray, list[dict[str, Any]]]:
         began = time.perf_counter()
         stepped = run_all(_step(env, action) for env, action in zip(self.envs, self._actions, strict=True))
         observations, rewards, dones, infos = zip(*stepped, strict=True)
@@ -201,24 +185,24 @@ class NativeVecEnv(VecEnv):
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
         return [isinstance(env, wrapper_class) for env in self._some(indices)]
 
-    def _some(self, indices: Any) -> list[Practice]:
+    def _some(self, indices: Any) -> list[TrainingEnv]:
         return [self.envs[k] for k in self._get_indices(indices)]
 
 
-def make_vec_env(table: Table, courses: Sequence[Course], n_envs: int, kind: str, seed: int) -> VecEnv:
-    """`n_envs` environments that take the courses in turn; `kind` "native": one process, "subproc": one each.
+def make_vec_env(factory: EnvFactory, tasks: Sequence[TaskSpec], n_envs: int, kind: str, seed: int) -> VecEnv:
+    """`n_envs` environments that take the tasks in turn; `kind` "native": one process, "subproc": one each.
 
     Raises ConfigError for settings out of range.
     """
-    if not courses or n_envs < len(courses):
-        raise ConfigError(f"{n_envs} environments for {len(courses)} courses: expected one course and n_envs as many")
-    chosen = [courses[k % len(courses)] for k in range(n_envs)]
+    if not tasks or n_envs < len(tasks):
+        raise ConfigError(f"{n_envs} environments for {len(tasks)} tasks: expected a task, and an environment for each")
+    chosen = [tasks[k % len(tasks)] for k in range(n_envs)]
     envs: VecEnv
     if kind == "native":
-        envs = NativeVecEnv([table.make(course) for course in chosen])
+        envs = NativeVecEnv([factory.make(task) for task in chosen])
     else:
-        table.make(chosen[0])  # what is wrong with the settings is said here
-        envs = SubprocVecEnv([_Worker(asdict(table), asdict(course)) for course in chosen], start_method="spawn")
+        factory.make(chosen[0])  # what is wrong with the settings is said here
+        envs = SubprocVecEnv([_Worker(factory, task) for task in chosen], start_method="spawn")
     envs.seed(seed)
     return envs
 
@@ -226,16 +210,15 @@ def make_vec_env(table: Table, courses: Sequence[Course], n_envs: int, kind: str
 class _Worker:
     """Makes an environment in a process of its own."""
 
-    def __init__(self, table: dict[str, Any], course: dict[str, Any]) -> None:
-        self._table, self._course = table, course
+    def __init__(self, factory: EnvFactory, task: TaskSpec) -> None:
+        self._factory, self._task = factory, task
 
     def __call__(self) -> gymnasium.Env[Any, Any]:
         set_threads(1)
-        table = {**self._table, "rules": Rules(**self._table["rules"])}
-        return Table(**table).make(Course(**self._course))
+        return self._factory.make(self._task)
 
 
-def _step(env: Practice, action: int) -> Routine[tuple[Observation, float, bool, dict[str, Any]]]:
+def _step(env: TrainingEnv, action: int) -> Routine[tuple[Observation, float, bool, dict[str, Any]]]:
     """A step and, where it ends the episode, the reset."""
     observation, reward, done, _, info = yield from env.step_routine(action)
     if done:
@@ -245,5 +228,5 @@ def _step(env: Practice, action: int) -> Routine[tuple[Observation, float, bool,
     return observation, reward, done, info
 
 
-def _stacked(observations: Sequence[Observation]) -> dict[str, np.ndarray[Any, Any]]:
+def _stacked(observations: Sequence[Observation]) -> dict[str, AnyArray]:
     return {name: np.stack([observation[name] for observation in observations]) for name in observations[0]}

@@ -38,10 +38,10 @@ class RlEvaluator(UniformEvaluator):
         if not self._fits(state):
             return super().prior(simulator, state, actions)
         logits = self._logits(simulator, state)
-        said = np.array([self._logit(logits, action) for action in actions])
-        odds = np.exp((said - max(float(said.max()), -1e6)) / self._temperature) + _FLOOR
-        normalised: FloatArray = odds / odds.sum()
-        return normalised
+        of_actions = np.array([self._logit(logits, action) for action in actions])
+        weights = np.exp((of_actions - max(float(of_actions.max()), -1e6)) / self._temperature) + _FLOOR
+        prior: FloatArray = weights / weights.sum()
+        return prior
 
     def expand(self, simulator: Simulator, state: State, actions: Sequence[Action]) -> list[State]:
         states = super().expand(simulator, state, actions)

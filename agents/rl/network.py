@@ -18,7 +18,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from agents.rl import reading
-from agents.rl.config import NetConfig, Rules
+from agents.rl.config import NetConfig, SpaceSpec
 from agents.rl.links import Links, averaged, links_of, summed, taken
 from autopoly_env.observation import Observer
 from autopoly_env.operators import Action, ActionCodec, operator_named
@@ -87,11 +87,11 @@ class Round(nn.Module):
 class MeshEncoder(nn.Module):
     """Observations to what is known of their elements and of the whole."""
 
-    def __init__(self, config: NetConfig, rules: Rules) -> None:
+    def __init__(self, config: NetConfig, spec: SpaceSpec) -> None:
         super().__init__()
-        self.config, self.rules = config, rules
+        self.config, self.spec = config, spec
         width = config.width
-        self.pictures = Pictures(config, rules.obs_resolution)
+        self.pictures = Pictures(config, spec.obs_resolution)
         n_points = reading.N_NEAR + reading.N_FAR + reading.N_INNER
         n_read = 2 * n_points + 2 * config.widths[0] + reading.N_SHAPE
         self.begin = nn.Sequential(nn.Linear(n_read, width), nn.ReLU(), nn.Linear(width, width))
@@ -133,21 +133,21 @@ class MeshEncoder(nn.Module):
         common = torch.minimum(shown, target).mean((1, 2))
         areas = torch.stack((common / union.clamp(min=1e-6), union - common, common, shown.mean((1, 2))), -1)
         counts = observation["counts"].float() / 16.0
-        left = observation["remaining_steps"].float() / self.rules.max_steps
+        left = observation["remaining_steps"].float() / self.spec.max_steps
         return torch.cat((counts, left, observation["price"].float(), areas), -1)
 
 
 class PointerHead(nn.Module):
     """Logits (B, G) of the actions, in the order of the codec; those that are not legal are NEVER."""
 
-    def __init__(self, config: NetConfig, rules: Rules) -> None:
+    def __init__(self, config: NetConfig, spec: SpaceSpec) -> None:
         super().__init__()
-        codec = ActionCodec(rules.operators, rules.max_vertices)
+        codec = ActionCodec(spec.operators, spec.max_vertices)
         self.n_actions = codec.n_actions
         # by kind of element: of each output the number of the first element's action, and the step to the next's
         self._places: dict[str, list[tuple[int, int]]] = {}
         self._bases: dict[str, str] = {}  # by kind: the elements of the mesh that it lies at
-        for name in rules.operators:
+        for name in spec.operators:
             kind = operator_named(name).element
             start = codec.encode(Action(name, 0))
             self._places.setdefault(kind.name, []).extend((start + k, kind.n_each) for k in range(kind.n_each))
@@ -164,9 +164,9 @@ class PointerHead(nn.Module):
         for kind, places in self._places.items():
             rows, batch, number = encoded.elements[self._bases[kind]]
             hidden = self.elements[kind](rows) + taken(self.whole[kind](whole), batch)
-            said = self.logits[kind](functional.relu(hidden))
+            logits = self.logits[kind](functional.relu(hidden))
             for column, (start, n_each) in enumerate(places):
-                values.append(said[:, column])
+                values.append(logits[:, column])
                 index.append(batch * self.n_actions + start + n_each * number)
         flat = whole.new_full((len(whole) * self.n_actions,), NEVER)
         logits = flat.scatter(0, torch.cat(index), torch.cat(values)).unflatten(0, (len(whole), self.n_actions))
@@ -188,11 +188,11 @@ class ValueHead(nn.Module):
 class MeshNet(nn.Module):
     """Encoder and heads; the names of its parts are those of a policy of Stable-Baselines3."""
 
-    def __init__(self, config: NetConfig, rules: Rules) -> None:
+    def __init__(self, config: NetConfig, spec: SpaceSpec) -> None:
         super().__init__()
-        self.config, self.rules = config, rules
-        self.features_extractor = MeshEncoder(config, rules)
-        self.action_net = PointerHead(config, rules)
+        self.config, self.spec = config, spec
+        self.features_extractor = MeshEncoder(config, spec)
+        self.action_net = PointerHead(config, spec)
         self.value_net = ValueHead(config)
         begin_flat(self.action_net)
 
@@ -210,9 +210,9 @@ def begin_flat(head: PointerHead) -> None:
         nn.init.zeros_(layer.bias)
 
 
-def observer_of(rules: Rules) -> Observer:
-    """Makes the observations that a policy of these rules reads."""
-    return Observer(rules.max_vertices, rules.obs_resolution, rules.max_steps)
+def observer_of(spec: SpaceSpec) -> Observer:
+    """Makes the observations of a space."""
+    return Observer(spec.max_vertices, spec.obs_resolution, spec.max_steps)
 
 
 def _elements(rows: Tensor, links: Links) -> dict[str, Elements]:

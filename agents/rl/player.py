@@ -1,4 +1,4 @@
-"""`Player`: a policy network at the simulator's table. It needs torch, and neither Gymnasium nor Stable-Baselines3.
+"""`Player`: a policy network that plays on a simulator. It needs torch, and neither Gymnasium nor Stable-Baselines3.
 
 Letters: B states, G actions of the codec.
 """
@@ -26,13 +26,13 @@ def observation_of(observation: Observation, mask: BoolArray, w_sc: float) -> Ob
 
 
 class Player:
-    """Says how promising actions are. `who` is its name in errors."""
+    """Says how promising actions are. `name` is what errors call it."""
 
-    def __init__(self, net: MeshNet, who: str = "the policy") -> None:
-        self.net, self.who = net.eval(), who
-        self.rules = net.rules
-        self.codec = ActionCodec(self.rules.operators, self.rules.max_vertices)
-        self._observer = observer_of(self.rules)
+    def __init__(self, net: MeshNet, name: str = "the policy") -> None:
+        self.net, self.name = net.eval(), name
+        self.spec = net.spec
+        self.codec = ActionCodec(self.spec.operators, self.spec.max_vertices)
+        self._observer = observer_of(self.spec)
         self._pictures: WeakKeyDictionary[Silhouette, ByteArray] = WeakKeyDictionary()
 
     def observe(self, simulator: Simulator, state: State) -> Observation:
@@ -41,12 +41,12 @@ class Player:
         Raises ConfigError where it knows none of the simulator's operators, and for a mesh that its padding has no
         room for.
         """
-        self.rules.check_operators(simulator.operators, self.who)
+        self.spec.check_operators(simulator.operators, self.name)
         self.check_fits(state)
         silhouette = simulator.silhouette
         if silhouette not in self._pictures:
             self._pictures[silhouette] = self._observer.picture_of(silhouette)
-        left = max(0, min(self.rules.max_steps, simulator.max_steps) - state.step)
+        left = max(0, min(self.spec.max_steps, simulator.max_steps) - state.step)
         seen = self._observer.observe(state.mesh, self._pictures[silhouette], left)
         return observation_of(seen, self.legal_mask(simulator, state), simulator.weights.w_sc)
 
@@ -57,7 +57,7 @@ class Player:
     def legal_mask(self, simulator: Simulator, state: State) -> BoolArray:
         """(G,) what may be done: what the codec has room for and the simulator, with its guidance, allows."""
         mask = self.codec.legal_mask(state.mesh)
-        for unknown in set(self.rules.operators).difference(simulator.operators):
+        for unknown in set(self.spec.operators).difference(simulator.operators):
             mask[self.codec.indices_of(unknown)] = False
         if simulator.guidance.names:
             allowed = np.zeros_like(mask)
@@ -71,8 +71,8 @@ class Player:
         batch = {name: torch.from_numpy(np.stack([one[name] for one in seen])) for name in seen[0]}
         device = next(self.net.parameters()).device
         with torch.inference_mode():
-            said, _ = self.net({name: tensor.to(device) for name, tensor in batch.items()})
-        logits: FloatArray = said.double().cpu().numpy()
+            output, _ = self.net({name: tensor.to(device) for name, tensor in batch.items()})
+        logits: FloatArray = output.double().cpu().numpy()
         return logits
 
     def ranked(
@@ -82,19 +82,20 @@ class Player:
 
         STOP alone where the construction has as many steps as the policy was trained to take.
         """
-        if state.step >= self.rules.max_steps:
+        if state.step >= self.spec.max_steps:
             return [STOP]
-        legal, odds = self._legal_logits(simulator, state)
+        legal, logits = self._legal_logits(simulator, state)
         if rng is not None:
-            odds = odds / temperature + rng.gumbel(size=len(odds))  # whose order is that of drawing without returning
-        return [self.codec.decode(int(legal[k])) for k in np.argsort(-odds, kind="stable")]
+            # Gumbel noise sorts as drawing without replacement does (Kool, van Hoof & Welling 2019)
+            logits = logits / temperature + rng.gumbel(size=len(logits))
+        return [self.codec.decode(int(legal[k])) for k in np.argsort(-logits, kind="stable")]
 
     def probabilities(self, simulator: Simulator, state: State, temperature: float = 1.0) -> dict[Action, float]:
         """The probability of each legal action, STOP first."""
         legal, logits = self._legal_logits(simulator, state)
-        odds = np.exp((logits - logits.max()) / temperature)
-        odds /= odds.sum()
-        return {self.codec.decode(int(k)): float(p) for k, p in zip(legal, odds, strict=True)}
+        probabilities = np.exp((logits - logits.max()) / temperature)
+        probabilities /= probabilities.sum()
+        return {self.codec.decode(int(k)): float(p) for k, p in zip(legal, probabilities, strict=True)}
 
     def play(
         self,

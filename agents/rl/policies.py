@@ -15,7 +15,7 @@ from stable_baselines3.common.type_aliases import Schedule
 from stable_baselines3.dqn.policies import DQNPolicy, QNetwork
 from torch import Tensor, nn
 
-from agents.rl.config import NetConfig, Rules
+from agents.rl.config import NetConfig, SpaceSpec
 from agents.rl.network import NEVER, Encoded, MeshEncoder, MeshNet, PointerHead, ValueHead, begin_flat
 
 PARTS = ("features_extractor", "action_net", "value_net")
@@ -24,9 +24,9 @@ PARTS = ("features_extractor", "action_net", "value_net")
 class MeshFeatures(BaseFeaturesExtractor):
     """`MeshEncoder` as a features extractor; what it gives is no tensor but `Encoded`."""
 
-    def __init__(self, observation_space: gymnasium.Space[Any], net: NetConfig, rules: Rules) -> None:
+    def __init__(self, observation_space: gymnasium.Space[Any], net: NetConfig, spec: SpaceSpec) -> None:
         super().__init__(observation_space, features_dim=net.width)
-        self.encoder = MeshEncoder(net, rules)
+        self.encoder = MeshEncoder(net, spec)
 
     def forward(self, observations: dict[str, Tensor]) -> Encoded:
         encoded: Encoded = self.encoder(observations)
@@ -57,13 +57,14 @@ class _Pointing(BasePolicy):
         action_space: gymnasium.Space[Any],
         lr_schedule: Schedule,
         net: NetConfig,
-        rules: Rules,
+        spec: SpaceSpec | None = None,
         **kwargs: Any,
     ) -> None:
-        self.net_config, self.rules = net, rules
+        spec = spec or kwargs.pop("rules")  # as older zips call it
+        self.net_config, self.spec = net, spec
         given = {
             "features_extractor_class": MeshFeatures,
-            "features_extractor_kwargs": {"net": net, "rules": rules},
+            "features_extractor_kwargs": {"net": net, "spec": spec},
             "normalize_images": False,  # the network scales pictures by itself
         }
         super().__init__(observation_space, action_space, lr_schedule, **{**given, **self._more, **kwargs})
@@ -71,7 +72,7 @@ class _Pointing(BasePolicy):
     def _get_constructor_parameters(self) -> dict[str, Any]:
         ours = ("features_extractor_class", "features_extractor_kwargs")
         parameters = {k: v for k, v in super()._get_constructor_parameters().items() if k not in ours}
-        return {**parameters, "net": self.net_config, "rules": self.rules}
+        return {**parameters, "net": self.net_config, "spec": self.spec}
 
 
 class _ActorCritic(_Pointing):
@@ -82,7 +83,7 @@ class _ActorCritic(_Pointing):
     def _build(self, lr_schedule: Schedule) -> None:
         policy: Any = self  # SB3 declares its own layers in these places
         policy.mlp_extractor = _Split()
-        policy.action_net = PointerHead(self.net_config, self.rules)
+        policy.action_net = PointerHead(self.net_config, self.spec)
         policy.value_net = ValueHead(self.net_config)
         begin_flat(policy.action_net)
         policy.optimizer = policy.optimizer_class(self.parameters(), lr=lr_schedule(1), **self.optimizer_kwargs)
@@ -99,10 +100,10 @@ class MaskablePointerPolicy(_ActorCritic, MaskableActorCriticPolicy):
 class PointerQNetwork(QNetwork):
     """Q of an action: what is still to be gained, and how much better than that the action is."""
 
-    def __init__(self, *args: Any, net: NetConfig, rules: Rules, **kwargs: Any) -> None:
+    def __init__(self, *args: Any, net: NetConfig, spec: SpaceSpec, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self.q_net = nn.Sequential()  # SB3's own layers are not used
-        self.action_net = PointerHead(net, rules)
+        self.action_net = PointerHead(net, spec)
         self.value_net = ValueHead(net)
         begin_flat(self.action_net)
 
@@ -119,13 +120,13 @@ class PointerDqnPolicy(_Pointing, DQNPolicy):
 
     def make_q_net(self) -> QNetwork:
         net_args = self._update_features_extractor(self.net_args, features_extractor=None)
-        return PointerQNetwork(**net_args, net=self.net_config, rules=self.rules).to(self.device)
+        return PointerQNetwork(**net_args, net=self.net_config, spec=self.spec).to(self.device)
 
 
 def net_of(policy: Any) -> MeshNet:
     """The network of a policy, as a copy on the CPU."""
     inner = getattr(policy, "q_net", policy)
-    net = MeshNet(policy.net_config, policy.rules)
+    net = MeshNet(policy.net_config, policy.spec)
     for name in PARTS:
         part = getattr(inner, name)
         part = part.encoder if isinstance(part, MeshFeatures) else part

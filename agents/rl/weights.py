@@ -3,9 +3,11 @@
 import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
-from agents.rl.config import ALGORITHMS, NetConfig, Rules
+from pydantic import AliasChoices, Field
+
+from agents.rl.config import ALGORITHMS, NetConfig, SpaceSpec
 from agents.rl.network import MeshNet
 from agents.weights_file import WeightsMeta, fill, read_meta, read_tensors, settings_of, write_weights
 from autopoly_env.errors import ConfigError
@@ -21,7 +23,7 @@ class PolicyMeta(WeightsMeta):
 
     algorithm: str  # one of ALGORITHMS, or "clone"
     net: dict[str, Any]  # NetConfig
-    rules: dict[str, Any]  # Rules
+    spec: Annotated[dict[str, Any], Field(validation_alias=AliasChoices("spec", "rules"))]  # SpaceSpec; "rules" before
 
 
 def file_of(agent: str, path: str | os.PathLike[str] = "") -> Path:
@@ -39,7 +41,7 @@ def file_of(agent: str, path: str | os.PathLike[str] = "") -> Path:
 
 def save_policy(path: Path, net: MeshNet, algorithm: str, training: dict[str, Any], metrics: dict[str, Any]) -> Path:
     """Write `path` (.safetensors) and the .json beside it; returns `path`. Raises OutputError."""
-    facts = {"algorithm": algorithm, "net": asdict(net.config), "rules": asdict(net.rules)}
+    facts = {"algorithm": algorithm, "net": asdict(net.config), "spec": asdict(net.spec)}
     return write_weights(path, net, PolicyMeta, training=training, metrics=metrics, **facts)
 
 
@@ -51,7 +53,7 @@ def load_policy(path: Path) -> tuple[MeshNet, PolicyMeta]:
     """
     meta = read_policy_meta(path)
     tensors = read_tensors(path, meta)
-    net = MeshNet(settings_of(path, NetConfig, meta.net), settings_of(path, Rules, meta.rules))
+    net = MeshNet(settings_of(path, NetConfig, meta.net), settings_of(path, SpaceSpec, meta.spec))
     fill(net, tensors, str(path))
     return net.eval(), meta
 

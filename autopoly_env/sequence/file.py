@@ -8,6 +8,7 @@ from typing import Annotated, Any, NoReturn
 import numpy as np
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
+from autopoly_env.arguments import first_defect
 from autopoly_env.errors import MeshError, SequenceError
 from autopoly_env.mesh import PolyMesh, Topology, validate
 
@@ -146,13 +147,13 @@ def _start_mesh(start: _Start) -> PolyMesh:
 
 def _first_defect(error: ValidationError) -> str:
     """The first complaint in one line: which step (from 1), which field, what is wrong."""
-    defect = error.errors(include_url=False)[0]
-    place = list(defect["loc"])
+    defect = first_defect(error)
+    place = defect.place
     step = ""
     if len(place) > 1 and place[0] == "steps":
         step = f"step {int(place[1]) + 1}: "
         place = place[2:]
-    return f"{step}{'.'.join(map(str, place)) or 'all of it'}: {defect['msg']}"
+    return f"{step}{'.'.join(map(str, place)) or 'all of it'}: {defect.problem}"
 
 
 def _finite(digits: str) -> float:

@@ -6,16 +6,15 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 import numpy as np
-import numpy.typing as npt
 from PIL import Image, UnidentifiedImageError
 
-from autopoly_env.arrays import Float32Array
+from autopoly_env.arrays import AnyArray, Float32Array
 from autopoly_env.errors import SilhouetteError
 
-ImageSource = str | os.PathLike[str] | IO[bytes] | Image.Image | npt.NDArray[Any]
+ImageSource = str | os.PathLike[str] | IO[bytes] | Image.Image | AnyArray
 
 MAX_SIDE = 2048  # pixels; longer pictures are reduced by an integer factor
 MAX_PIXELS = 500_000_000  # larger pictures are refused
@@ -129,7 +128,7 @@ def _read_pillow(image: Image.Image, name: str, label: str) -> Picture:
     return Picture(levels[0], levels[1] if len(levels) == 2 else None, name, label, tuple(notes))
 
 
-def _read_array(array: npt.NDArray[Any]) -> Picture:
+def _read_array(array: AnyArray) -> Picture:
     label = f"the given array of shape {array.shape} and dtype {array.dtype}"
     if array.ndim not in (2, 3) or (array.ndim == 3 and array.shape[2] not in (1, 2, 3, 4)):
         raise SilhouetteError(f"{label} is no image; expected (H, W) or (H, W, 1 to 4): reshape it")
@@ -153,7 +152,7 @@ def _read_array(array: npt.NDArray[Any]) -> Picture:
     return Picture(grey, opacity, "silhouette", label, tuple(notes))
 
 
-def _array_levels(array: npt.NDArray[Any]) -> Float32Array:
+def _array_levels(array: AnyArray) -> Float32Array:
     """Grey (and alpha) of some rows of an array: (1 or 2, rows, W) float32 in 0..1."""
     levels = array.astype(np.float32) / np.float32(255 if array.dtype == np.uint8 else 1)
     if levels.ndim == 2:

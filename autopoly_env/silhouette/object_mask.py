@@ -1,11 +1,8 @@
 """Which pixels of a picture are the object: alpha or Otsu with a border vote, then cleaning and squaring."""
 
-from typing import Any
-
 import numpy as np
-import numpy.typing as npt
 
-from autopoly_env.arrays import BoolArray, Float32Array, IntArray
+from autopoly_env.arrays import AnyArray, BoolArray, Float32Array, IntArray
 from autopoly_env.errors import SilhouetteError
 from autopoly_env.silhouette.loading import Picture
 
@@ -147,7 +144,7 @@ def _holes(mask: BoolArray) -> IntArray:
     return numbers[labels]
 
 
-def _border(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+def _border(array: AnyArray) -> AnyArray:
     return np.concatenate([array[0], array[-1], array[1:-1, 0], array[1:-1, -1]])
 
 

@@ -5,9 +5,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from autopoly_env.arrays import BoolArray, FloatArray, IntArray
+from autopoly_env.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from autopoly_env.errors import ConfigError, SilhouetteError
 from autopoly_env.silhouette import object_mask
 from autopoly_env.silhouette.image_files import find_images
@@ -53,7 +52,7 @@ class Target:
         object.__setattr__(self, "mask", _read_only(mask))
         weights = None if self.weights is None else _read_only(np.rint(self.weights * WEIGHT_STEPS) / WEIGHT_STEPS)
 
-        def weighed(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        def weighed(values: AnyArray) -> AnyArray:
             return values if weights is None else values * weights
 
         object.__setattr__(self, "weights", weights)
@@ -191,13 +190,13 @@ def _cell_sums(values: IntArray, resolution: int) -> IntArray:
     return np.diff(prefix[whole] * resolution + begun_pixel * rest[:, None], axis=0)
 
 
-def _row_prefix_sums(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+def _row_prefix_sums(values: AnyArray) -> AnyArray:
     n_rows, n_columns = values.shape
     sums = np.zeros((n_rows, n_columns + 1), dtype=values.dtype)
     np.cumsum(values, axis=1, out=sums[:, 1:])
     return _read_only(sums)
 
 
-def _read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+def _read_only(array: AnyArray) -> AnyArray:
     array.setflags(write=False)
     return array

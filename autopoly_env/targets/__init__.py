@@ -15,9 +15,11 @@ from autopoly_env.targets.construction import ConstructionTargets
 from autopoly_env.targets.folder import FolderTargets
 from autopoly_env.targets.objects import ObjectTargets
 from autopoly_env.targets.shapenet import ShapeNetTargets
-from autopoly_env.targets.source import SPLITS, TargetSource, split_seed
+from autopoly_env.targets.source import HELD_OUT, LEARNING, SPLITS, TargetSource, split_seed
 
 __all__ = [
+    "HELD_OUT",
+    "LEARNING",
     "SPLITS",
     "ConstructionTargets",
     "FolderTargets",

@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
+from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import HoleChoice, preset
@@ -125,7 +126,7 @@ def _placed(start: PolyMesh, steps: list[Grown], side: float) -> tuple[PolyMesh,
     if scale * extent < MIN_SIDE or scale**2 * area < AREA[0]:
         return None
 
-    def put(points: np.ndarray) -> np.ndarray:
+    def put(points: FloatArray) -> FloatArray:
         return 0.5 + scale * (points - centre)
 
     placed = []

@@ -1,4 +1,13 @@
-"""What a target source is, and which seeds are for training and which for tests."""
+"""What a target source is, and which of its seeds are learnt from, measured on while learning, and tested on.
+
+| seeds | range | who draws them |
+|---|---|---|
+| `LEARNING` | 0 .. 2³⁰ - 1 | everything that learns: environments, samples, data sets, the teacher's constructions |
+| `HELD_OUT` | 2³⁰ .. 2³¹ - 1 | whatever measures a network or a policy while it learns, and chooses among them |
+| `SPLITS["test"]` | 2³¹ .. 2³² - 1 | what is published: suites, benchmarks |
+
+`SPLITS["train"]` is the first two together.
+"""
 
 from typing import Protocol
 
@@ -7,6 +16,8 @@ from autopoly_env.silhouette import Silhouette
 
 N_SEEDS = 2**32
 SPLITS = {"train": range(2**31), "test": range(2**31, N_SEEDS)}
+LEARNING = range(2**30)
+HELD_OUT = range(LEARNING.stop, SPLITS["train"].stop)
 
 
 class TargetSource(Protocol):

@@ -12,18 +12,17 @@ from autopoly_env.arguments import one_of, whole
 from autopoly_env.errors import AutoPolyError, ConfigError, OutputError, RunError
 from autopoly_env.files import write_atomically
 from autopoly_env.sequence import ConstructionSequence
-from autopoly_env.targets import ConstructionTargets, ObjectTargets, split_seed
+from autopoly_env.targets import HELD_OUT, LEARNING, SPLITS, ConstructionTargets, ObjectTargets
 from training.datasets.shards import MANIFEST, Example, Manifest, ShardInfo, checksum, pack, read_manifest, read_shard
 from training.parallel import map_tasks
 
 MAX_N = 2**22  # targets of a data set: as many seeds does it have to itself
 MAX_SEED = 2**8 - 1
-FIRST_VALIDATION = 2**30  # of the train seeds those from here on are for validation
-SPLITS = ("train", "validation", "test")
+SEEDS = {"train": LEARNING, "validation": HELD_OUT, "test": SPLITS["test"]}  # of each split of a data set
 
 
 @dataclass(frozen=True)
-class Settings:
+class DatasetSettings:
     """What the targets of a data set are. No two seeds or splits share a target."""
 
     kind: Literal["constructions", "objects"]
@@ -35,7 +34,7 @@ class Settings:
     families: str | None = None  # of objects
 
     def __post_init__(self) -> None:
-        one_of("split", self.split, SPLITS)
+        one_of("split", self.split, tuple(SEEDS))
         if not 0 <= self.seed <= MAX_SEED:
             raise ConfigError(f"seed {self.seed}: expected 0 to {MAX_SEED}")
         self.source()
@@ -48,10 +47,7 @@ class Settings:
 
     def source_seed(self, index: int) -> int:
         """The source's seed of target number `index`, 0 <= index < MAX_N."""
-        number = self.seed * MAX_N + index
-        if self.split == "validation":
-            return split_seed("train", FIRST_VALIDATION + number)
-        return split_seed(self.split, number)
+        return SEEDS[self.split][self.seed * MAX_N + index]
 
     def example(self, index: int) -> Example:
         """Target number `index`."""
@@ -68,7 +64,7 @@ class Settings:
 class ShardTask:
     """One shard to be made."""
 
-    settings: Settings
+    settings: DatasetSettings
     name: str
     indices: range
 
@@ -78,7 +74,9 @@ def make_shard(task: ShardTask) -> bytes:
     return pack([task.settings.example(index) for index in task.indices])
 
 
-def begin_dataset(folder: Path, settings: Settings, n: int, shard_size: int, *, resume: bool, fresh: bool) -> Manifest:
+def begin_dataset(
+    folder: Path, settings: DatasetSettings, n: int, shard_size: int, *, resume: bool, fresh: bool
+) -> Manifest:
     """The manifest to go on from, written; `resume` keeps the shards that are whole, `fresh` removes them all.
 
     Raises ConfigError if the folder has a data set and neither is asked for, or one of other settings; RunError if its
@@ -99,7 +97,7 @@ def begin_dataset(folder: Path, settings: Settings, n: int, shard_size: int, *, 
 
 def build_dataset(
     folder: Path,
-    settings: Settings,
+    settings: DatasetSettings,
     manifest: Manifest,
     *,
     engine: str = "process",
@@ -180,7 +178,7 @@ def _remove(folder: Path) -> None:
         raise OutputError(f"cannot remove the data set in {folder} ({error.strerror}); give another folder") from None
 
 
-def _plain(settings: Settings) -> dict[str, object]:
+def _plain(settings: DatasetSettings) -> dict[str, object]:
     """The settings that matter for their kind, as JSON gives them back."""
     values = {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(settings).items()}
     other = ("families",) if settings.kind == "constructions" else ("difficulty", "operators")

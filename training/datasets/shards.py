@@ -27,6 +27,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field, TypeAdapter, ValidationError
 
+from autopoly_env.arguments import first_defect
 from autopoly_env.arrays import BoolArray
 from autopoly_env.errors import RunError
 from autopoly_env.files import write_atomically
@@ -108,8 +109,7 @@ def read_manifest(folder: str | os.PathLike[str]) -> Manifest:
     try:
         manifest = _MANIFEST.validate_python(values)
     except ValidationError as error:
-        first = error.errors()[0]
-        raise RunError(f"{path} is damaged: {'.'.join(map(str, first['loc']))}: {first['msg']}") from None
+        raise RunError(f"{path} is damaged: {first_defect(error)}") from None
     strange = sorted({shard.name for shard in manifest.shards}.difference(manifest.names))
     if strange:
         raise RunError(f"{path} is damaged: it names the shard {strange[0]!r}; make the data set anew")

@@ -14,7 +14,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from training.evaluation.tasks import Task
+from training.evaluation.tasks import EvalTask
 from training.records import Record
 
 SECONDS_A_LINE = 30.0  # where there is no terminal
@@ -57,12 +57,12 @@ class Display:
     def __exit__(self, *_: object) -> None:
         self._bar.stop()
 
-    def begun(self, task: Task) -> None:
+    def begun(self, task: EvalTask) -> None:
         """A worker has a task."""
         self._in_work[_key(task)] = None
         self._bar.update(self._row, description=self._text())
 
-    def done(self, task: Task, record: Record) -> None:
+    def done(self, task: EvalTask, record: Record) -> None:
         """A task is over and recorded."""
         self._in_work.pop(_key(task), None)
         self._n_done += 1
@@ -96,5 +96,5 @@ class Display:
         self._console.print(text, markup=False, highlight=False, emoji=False, soft_wrap=True)
 
 
-def _key(task: Task) -> tuple[str, str, int]:
+def _key(task: EvalTask) -> tuple[str, str, int]:
     return task.agent, task.target.name, task.seed

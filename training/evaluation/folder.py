@@ -38,8 +38,8 @@ def joined(info: RunInfo, other: RunInfo, folder: Path) -> RunInfo:
     agents = {entry["label"]: entry for entry in info.suite["agents"]}
     others = {entry["label"]: entry for entry in other.suite["agents"]}
     common = agents.keys() & others.keys()
-    ours = {**info.suite, "agents": {label: agents[label] for label in common}}
-    theirs = {**other.suite, "agents": {label: others[label] for label in common}}
+    ours = {**info.suite, "agents": {label: _measured(agents[label]) for label in common}}
+    theirs = {**other.suite, "agents": {label: _measured(others[label]) for label in common}}
     difference = _difference(ours, theirs)
     if difference:
         raise RunError(
@@ -108,6 +108,11 @@ def merge(parts: Sequence[Path], folder: Path, *, fresh: bool) -> RunInfo:
         if found is not None and found != target_path(folder, name):
             write_atomically(target_path(folder, name), found.read_bytes())
     return info
+
+
+def _measured(entry: dict[str, Any]) -> dict[str, Any]:
+    """What an agent's results hang on: not on what its row says where there is no such agent."""
+    return {key: value for key, value in entry.items() if key != "missing"}
 
 
 def _difference(ours: Any, theirs: Any, key: str = "") -> str:

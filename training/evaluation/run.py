@@ -12,7 +12,7 @@ from training.evaluation.display import Display
 from training.evaluation.folder import begin, claim
 from training.evaluation.suite import GROUND_TRUTH, Suite, takes_seed
 from training.evaluation.targets import Target
-from training.evaluation.tasks import Task, solve_task
+from training.evaluation.tasks import EvalTask, solve_task
 from training.parallel import check_engine, map_tasks
 from training.records import target_path
 
@@ -27,14 +27,14 @@ class Machines:
 
 
 @dataclass(frozen=True)
-class Shard:
+class TargetShard:
     """Every n-th target, from the number k on, which counts from 1."""
 
     k: int = 1
     n: int = 1
 
     @classmethod
-    def parse(cls, text: str) -> "Shard":
+    def parse(cls, text: str) -> "TargetShard":
         """The shard "k/n". Raises ConfigError."""
         k, slash, n = text.partition("/")
         if not (slash and k.isdecimal() and n.isdecimal() and 1 <= int(k) <= int(n)):
@@ -52,7 +52,7 @@ def run_suite(
     machines: Machines,
     *,
     only: set[str],
-    shard: Shard,
+    shard: TargetShard,
     resume: bool,
     fresh: bool,
     quiet: bool,
@@ -71,7 +71,7 @@ def run_suite(
     info, done = claim(folder, suite, [target.name for target in targets], resume=resume, fresh=fresh)
     keys = [(label, t, seed) for t in shard.of(targets) for label, seed in _players(suite, t, missing.keys(), only)]
     waiting = [key for key in keys if (key[0], key[1].name, key[2]) not in done]
-    tasks = (Task(label, t, seed, not target_path(folder, t.name).exists()) for label, t, seed in waiting)
+    tasks = (EvalTask(label, t, seed, not target_path(folder, t.name).exists()) for label, t, seed in waiting)
     with Display(len(keys), len(keys) - len(waiting), quiet=quiet) as display:
         results = map_tasks(
             partial(solve_task, suite),

@@ -25,7 +25,7 @@ WARM_UP = Budget(refits=30)
 
 
 @dataclass(frozen=True)
-class Task:
+class EvalTask:
     """An agent, by its label, and what it is to do."""
 
     agent: str
@@ -65,7 +65,7 @@ class Curve:
         return [self._points[k] for k in np.unique(np.linspace(0, n - 1, min(n, N_CURVE)).round().astype(int))]
 
 
-def solve_task(suite: Suite, task: Task) -> Result:
+def solve_task(suite: Suite, task: EvalTask) -> Result:
     """Do a task; whatever goes wrong with it is in its record."""
     picture = None
     try:
@@ -78,7 +78,7 @@ def solve_task(suite: Suite, task: Task) -> Result:
     return Result(Record(task.agent, task.target.name, task.seed, outcome), picture)
 
 
-def _solved(suite: Suite, task: Task, silhouette: Silhouette) -> Outcome:
+def _solved(suite: Suite, task: EvalTask, silhouette: Silhouette) -> Outcome:
     """What an agent makes of the target within its budget."""
     entry = suite.entry(task.agent)
     _warm_up(suite, entry)
@@ -101,7 +101,7 @@ def _solved(suite: Suite, task: Task, silhouette: Silhouette) -> Outcome:
     )
 
 
-def _known(suite: Suite, task: Task, silhouette: Silhouette) -> Outcome:
+def _known(suite: Suite, task: EvalTask, silhouette: Silhouette) -> Outcome:
     """What the mesh is worth that the target was made from."""
     sequence = task.target.known()
     if sequence is None:

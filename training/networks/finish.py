@@ -11,8 +11,8 @@ import torch
 from agents.guided.layers import n_parameters
 from agents.guided.weights import SHIPPED, save_weights
 from autopoly_env.files import write_atomically
-from training.describe_networks import cost
-from training.networks.trainer import Task
+from training.networks.cost import cost
+from training.networks.trainer import TrainingTask
 
 _ABOUT = {
     "nfap": "nFAP-Net: from the rendering of a mesh and a target silhouette to the next actions and where they work.",
@@ -27,7 +27,7 @@ _LIMITS = {
 }
 
 
-def finish_run(task: Task, settings: dict[str, Any], folder: Path, device: torch.device, export: bool) -> None:
+def finish_run(task: TrainingTask, settings: dict[str, Any], folder: Path, device: torch.device, export: bool) -> None:
     """Measure the network that `train` left, write report.json and NAME.safetensors; with `export` to the project."""
     task.net.eval()
     with torch.no_grad():
@@ -55,7 +55,7 @@ def _origin(folder: str, data: dict[str, Any]) -> str:
     return f"{n_shards} shards of `training.make_expert`: `{source}`"
 
 
-def _card(task: Task, settings: dict[str, Any], metrics: dict[str, float], work: dict[str, float]) -> str:
+def _card(task: TrainingTask, settings: dict[str, Any], metrics: dict[str, float], work: dict[str, float]) -> str:
     """The model card."""
     rows = "\n".join(f"| {name} | {value:.4g} |" for name, value in metrics.items())
     costs = "\n".join(f"| {name} | {value:.4g} |" for name, value in work.items())

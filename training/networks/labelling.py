@@ -17,6 +17,7 @@ import numpy as np
 from agents.budget import Budget
 from agents.registry import make_agent
 from agents.search.evaluator import ResidualEvaluator
+from autopoly_env.arrays import Float32Array, FloatArray
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh, is_sane
 from autopoly_env.operators import Action
@@ -25,11 +26,10 @@ from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence.ids import decoded
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator, State
-from autopoly_env.targets import ConstructionTargets, ObjectTargets
+from autopoly_env.targets import HELD_OUT, LEARNING, ConstructionTargets, ObjectTargets
 from training.networks.trajectories import STOPPED, Labelled, Trajectory
 
 _TRACED_PRICES = (0.5, 4.0)  # of complexity, in units of the one that counts, that traced outlines are made for
-_HELD_OUT = 2**30  # first seed of the held-out targets; all are of the split "train", none of "test"
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,8 @@ class SourceConfig:
 def build_trajectory(config: SourceConfig, number: int, held_out: bool = False) -> Trajectory:
     """The labelled construction of this number; held-out ones are of other targets."""
     rng = np.random.default_rng((config.seed, number, int(held_out)))
-    seed = (_HELD_OUT if held_out else 0) + int(rng.integers(_HELD_OUT))
+    seeds = HELD_OUT if held_out else LEARNING
+    seed = seeds[int(rng.integers(len(seeds)))]
     if config.source == "simulator":
         targets = _constructions(config)
         return _from_sequence(config, targets.sample(seed), targets.sample_sequence(seed))
@@ -119,8 +120,8 @@ def _taught(config: SourceConfig, simulator: Simulator, rng: np.random.Generator
 
 def _traced_mesh(config: SourceConfig, silhouette: Silhouette, rng: np.random.Generator) -> PolyMesh:
     """The best traced outline for a price of complexity near the one that counts."""
-    dearer = float(np.exp(rng.uniform(*np.log(_TRACED_PRICES))))
-    return make_agent("trace").solve(_simulator(config, silhouette, config.w_sc * dearer)).mesh
+    factor = float(np.exp(rng.uniform(*np.log(_TRACED_PRICES))))
+    return make_agent("trace").solve(_simulator(config, silhouette, config.w_sc * factor)).mesh
 
 
 def _teach(
@@ -134,8 +135,8 @@ def _teach(
     for child in children:
         outcomes[_row(rows, child)] = _parts(child.score)
     gains = np.array([0.0, *(child.score.total - state.score.total for child in children)])
-    odds = np.exp((gains - gains.max()) / config.play_temperature)
-    drawn = int(rng.choice(len(gains), p=odds / odds.sum())) - 1
+    probabilities = np.exp((gains - gains.max()) / config.play_temperature)
+    drawn = int(rng.choice(len(gains), p=probabilities / probabilities.sum())) - 1
     following = children[drawn] if drawn >= 0 else None
     chosen = STOPPED if following is None else _row(rows, following)
     log_residual[:] = _log_residual(simulator, state, actions)
@@ -169,13 +170,13 @@ def _hard(simulator: Simulator, mesh: PolyMesh, taken: Action | None) -> Labelle
     return Labelled(mesh, _parts(state.score), tuple(actions), outcomes, log_residual, chosen)
 
 
-def _log_residual(simulator: Simulator, state: State, actions: Sequence[Action]) -> np.ndarray:
+def _log_residual(simulator: Simulator, state: State, actions: Sequence[Action]) -> FloatArray:
     return np.log(ResidualEvaluator().prior(simulator, state, actions))
 
 
-def _parts(score: Score) -> np.ndarray:
+def _parts(score: Score) -> Float32Array:
     return np.array((score.iou, score.complexity, score.self_intersections), np.float32)
 
 
-def _unknown(n: int) -> tuple[np.ndarray, np.ndarray]:
+def _unknown(n: int) -> tuple[Float32Array, Float32Array]:
     return np.full((n, 3), np.nan, np.float32), np.zeros(n, np.float32)

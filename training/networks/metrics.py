@@ -10,7 +10,7 @@ from torch import Tensor
 
 from agents.guided.config import CLASSES
 from agents.guided.nfap import Foresight, NfapNet, candidates_of
-from training.networks.samples import Batch
+from training.networks.streams import Batch
 
 TOP = 3
 
@@ -24,7 +24,7 @@ def mean_rows(rows: Sequence[dict[str, float]]) -> dict[str, float]:
     return means
 
 
-def nfap_metrics(net: NfapNet, said: Foresight, batch: Batch) -> dict[str, float]:
+def nfap_metrics(net: NfapNet, foresight: Foresight, batch: Batch) -> dict[str, float]:
     """How good stage 1 is.
 
     operator_accuracy: the likeliest operator class is the label's (*_majority: always saying the batch's commonest
@@ -37,13 +37,13 @@ def nfap_metrics(net: NfapNet, said: Foresight, batch: Batch) -> dict[str, float
     majority = torch.bincount(truth, minlength=len(CLASSES)).argmax()
     rows = batch["policy"].sum(-1) > 0
     found = {
-        "operator_accuracy": _share(said.operators[:, 0].argmax(-1) == truth),
+        "operator_accuracy": _share(foresight.operators[:, 0].argmax(-1) == truth),
         "operator_accuracy_majority": _share(truth == majority),
         "choice_least": float(torch.special.entr(batch["policy"]).sum(-1).mean()),
     }
     if not bool(rows.any()):
         return found | dict.fromkeys(_ranked_names(), float("nan"))
-    prior = net.choose(said, candidates_of(batch))[rows]
+    prior = net.choose(foresight, candidates_of(batch))[rows]
     residual = batch["log_residual"][rows].masked_fill(batch["classes"][rows] < 0, -torch.inf)
     for suffix, logits in (("", prior), ("_residual", residual)):
         found |= {name + suffix: value for name, value in _ranked(logits, batch, rows).items()}

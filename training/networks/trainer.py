@@ -13,15 +13,15 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
-import numpy as np
 import torch
 import torch.distributed as dist
 from torch import Tensor, nn
 from torch.nn.parallel import DistributedDataParallel
 
+from autopoly_env.arrays import ByteArray
 from autopoly_env.errors import ConfigError, RunError
 from autopoly_env.files import write_atomically
-from training.networks.samples import Batch, batches
+from training.networks.streams import Batch, batches
 from training.options import check_same_run
 from training.run_log import RunLog
 
@@ -79,7 +79,7 @@ class RunConfig:
         return torch.autocast(device.type, torch.bfloat16, enabled=wanted)
 
 
-class Task(Protocol):
+class TrainingTask(Protocol):
     """What is trained, on what, and how it is measured."""
 
     name: str
@@ -96,12 +96,12 @@ class Task(Protocol):
     def measure(self, device: torch.device) -> dict[str, float]:
         """Held-out metrics of `net`, "loss" among them."""
 
-    def draw(self, device: torch.device) -> np.ndarray:
-        """(H, W) or (H, W, 3) uint8: predictions beside the truth."""
+    def draw(self, device: torch.device) -> ByteArray:
+        """(H, W) or (H, W, 3): predictions beside the truth."""
 
 
 @dataclass(frozen=True)
-class Place:
+class Process:
     """Which of W processes this is, and where it computes."""
 
     rank: int = 0
@@ -115,8 +115,8 @@ class Place:
 
 
 @contextmanager
-def place_of(config: RunConfig) -> Iterator[Place]:
-    """This process's place: as torchrun says, else alone. Raises ConfigError if there is no GPU for device "cuda"."""
+def process_of(config: RunConfig) -> Iterator[Process]:
+    """This process: as torchrun says, else alone. Raises ConfigError if there is no GPU for device "cuda"."""
     has_gpu = torch.cuda.is_available()
     if config.device == "cuda" and not has_gpu:
         raise ConfigError("device cuda: torch finds no GPU here; give run.device=cpu")
@@ -126,13 +126,13 @@ def place_of(config: RunConfig) -> Iterator[Place]:
     local = int(os.environ.get("LOCAL_RANK", "0"))
     device = torch.device("cuda", local) if on_gpu else torch.device("cpu")
     if int(os.environ.get("WORLD_SIZE", "1")) == 1:
-        yield Place(device=device)
+        yield Process(device=device)
         return
     if on_gpu:
         torch.cuda.set_device(device)
     dist.init_process_group("nccl" if on_gpu else "gloo")
     try:
-        yield Place(dist.get_rank(), dist.get_world_size(), device)
+        yield Process(dist.get_rank(), dist.get_world_size(), device)
     finally:
         dist.destroy_process_group()
 
@@ -148,34 +148,36 @@ class _Progress:
     n_worse: int = 0  # measurements since
 
 
-def train(task: Task, optim: OptimConfig, run: RunConfig, settings: dict[str, Any], folder: Path, place: Place) -> None:
+def train(
+    task: TrainingTask, optim: OptimConfig, run: RunConfig, settings: dict[str, Any], folder: Path, process: Process
+) -> None:
     """Train `task.net` to the end, or go on with what `folder` holds; leaves the best network in `task.net`.
 
     Raises RunError if the folder belongs to a run with other settings, or the loss is not a number.
     """
     progress = _Progress()
-    task.losses.to(place.device)
+    task.losses.to(process.device)
     optimizer = torch.optim.AdamW(task.net.parameters(), lr=optim.lr, weight_decay=optim.weight_decay)
-    _resume(task, optimizer, progress, settings, folder, place)
-    losses: nn.Module = DistributedDataParallel(task.losses) if place.n_ranks > 1 else task.losses
-    log = RunLog(folder, progress.step) if place.leads else None
+    _resume(task, optimizer, progress, settings, folder, process)
+    losses: nn.Module = DistributedDataParallel(task.losses) if process.n_ranks > 1 else task.losses
+    log = RunLog(folder, progress.step) if process.leads else None
     if log is not None and progress.step:
         print(f"{folder}: goes on at step {progress.step}", flush=True)
-    stream = batches(task.stream, optim.batch_size, run.n_workers, progress.step, place.rank, place.n_ranks)
+    stream = batches(task.stream, optim.batch_size, run.n_workers, progress.step, process.rank, process.n_ranks)
     while progress.step < optim.n_steps and progress.n_worse < run.patience:
         step = progress.step
-        batch = {name: tensor.to(place.device, non_blocking=True) for name, tensor in next(stream).items()}
+        batch = {name: tensor.to(process.device, non_blocking=True) for name, tensor in next(stream).items()}
         terms = _update(losses, optimizer, batch, optim, step)
         if not math.isfinite(terms["loss"]):
-            raise RunError(_broken(terms, run.seed, step, optim.batch_size, place))
+            raise RunError(_broken(terms, run.seed, step, optim.batch_size, process))
         progress.step = step + 1
         if log is not None and progress.step % run.log_every == 0:
             log.write(progress.step, "train", {**terms, "lr": optim.lr_at(step)})
         if progress.step % run.eval_every == 0 or progress.step == optim.n_steps:
-            _measure(task, progress, log, place)
-        if place.leads and (progress.step % run.save_every == 0 or progress.step == optim.n_steps):
+            _measure(task, progress, log, process)
+        if process.leads and (progress.step % run.save_every == 0 or progress.step == optim.n_steps):
             _save(task, optimizer, progress, settings, folder)
-    if place.leads:
+    if process.leads:
         _save(task, optimizer, progress, settings, folder)
     task.net.load_state_dict(progress.best)
 
@@ -195,8 +197,8 @@ def _update(
     return {name: float(term.detach()) for name, term in terms.items()}
 
 
-def _broken(terms: dict[str, float], seed: int, step: int, batch_size: int, place: Place) -> str:
-    begin = (step * place.n_ranks + place.rank) * batch_size
+def _broken(terms: dict[str, float], seed: int, step: int, batch_size: int, process: Process) -> str:
+    begin = (step * process.n_ranks + process.rank) * batch_size
     odd = [name for name, term in terms.items() if not math.isfinite(term)]
     return (
         f"the loss is {terms['loss']} at step {step} ({', '.join(odd)}): samples {begin}..{begin + batch_size - 1} of "
@@ -204,19 +206,19 @@ def _broken(terms: dict[str, float], seed: int, step: int, batch_size: int, plac
     )
 
 
-def _measure(task: Task, progress: _Progress, log: RunLog | None, place: Place) -> None:
+def _measure(task: TrainingTask, progress: _Progress, log: RunLog | None, process: Process) -> None:
     """Measure on the held-out samples, in the leading process; all learn whether it was better."""
-    loss = torch.zeros((), dtype=torch.float64, device=place.device)
+    loss = torch.zeros((), dtype=torch.float64, device=process.device)
     if log is not None:
         task.net.eval()
         with torch.no_grad():
-            metrics = task.measure(place.device)
+            metrics = task.measure(process.device)
             log.write(progress.step, "held_out", metrics)
-            log.picture(progress.step, task.draw(place.device))
+            log.picture(progress.step, task.draw(process.device))
         task.net.train()
         loss.fill_(metrics["loss"])
         print(f"step {progress.step}: " + ", ".join(f"{k} {v:.4g}" for k, v in metrics.items()), flush=True)
-    if place.n_ranks > 1:
+    if process.n_ranks > 1:
         dist.broadcast(loss, 0)
     if not math.isfinite(float(loss)):
         raise RunError(f"the held-out loss is {float(loss)} at step {progress.step}; begin anew with a lower optim.lr")
@@ -234,7 +236,7 @@ def _checkpoint(folder: Path) -> Path:
 
 
 def _save(
-    task: Task, optimizer: torch.optim.Optimizer, progress: _Progress, settings: dict[str, Any], folder: Path
+    task: TrainingTask, optimizer: torch.optim.Optimizer, progress: _Progress, settings: dict[str, Any], folder: Path
 ) -> None:
     buffer = BytesIO()
     state = {
@@ -248,19 +250,19 @@ def _save(
 
 
 def _resume(
-    task: Task,
+    task: TrainingTask,
     optimizer: torch.optim.Optimizer,
     progress: _Progress,
     settings: dict[str, Any],
     folder: Path,
-    place: Place,
+    process: Process,
 ) -> None:
     """Put everything as the folder's checkpoint has it, if there is one."""
     path = _checkpoint(folder)
     if not path.exists():
         return
     try:
-        state = torch.load(path, map_location=place.device, weights_only=True)
+        state = torch.load(path, map_location=process.device, weights_only=True)
         known, saved = state["settings"], state["progress"]
     except Exception as error:  # torch raises whatever the damage leads it to
         raise RunError(f"cannot read {path} ({type(error).__name__}); delete it to begin anew") from None

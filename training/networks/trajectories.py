@@ -10,13 +10,11 @@ from functools import cached_property
 from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
-from numpy.typing import NDArray
 
-from autopoly_env.arrays import BoolArray
+from autopoly_env.arrays import AnyArray, BoolArray, Float32Array, IntArray
 from autopoly_env.errors import ConfigError
 from autopoly_env.files import write_atomically
 from autopoly_env.mesh import PolyMesh, Topology
@@ -34,10 +32,10 @@ class Labelled:
     """A state, its legal actions, and what is known of them."""
 
     mesh: PolyMesh
-    score: NDArray[np.float32]  # (3,) IoU, complexity, self-intersections
+    score: Float32Array  # (3,) IoU, complexity, self-intersections
     actions: tuple[Action, ...]  # without STOP; none where the construction was over or goes on unseen
-    outcomes: NDArray[np.float32]  # (A, 3) as `score`, after each action and its refit; NaN where not known
-    log_residual: NDArray[np.float32]  # (A,) log of the residual prior
+    outcomes: Float32Array  # (A, 3) as `score`, after each action and its refit; NaN where not known
+    log_residual: Float32Array  # (A,) log of the residual prior
     chosen: int  # row of the action that was taken, or STOPPED
 
 
@@ -67,7 +65,7 @@ class Trajectory:
 class Shard:
     """Trajectories packed into arrays; unpacked one at a time."""
 
-    def __init__(self, arrays: dict[str, NDArray[Any]]) -> None:
+    def __init__(self, arrays: dict[str, AnyArray]) -> None:
         self.arrays = arrays
 
     def __len__(self) -> int:
@@ -100,7 +98,7 @@ class Shard:
         )
 
     @cached_property
-    def _starts(self) -> dict[str, NDArray[np.int64]]:
+    def _starts(self) -> dict[str, IntArray]:
         return {
             name: np.concatenate(([0], np.cumsum(self.arrays[name], dtype=np.int64)))
             for name in ("n_states", "n_vertices", "n_faces", "face_sizes", "n_actions")

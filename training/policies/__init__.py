@@ -1,1 +1,1 @@
-"""Training of policies: configuration, exams, and what is kept of them."""
+"""Training of policies: settings, the session between rollouts, evaluation on held-out targets, cloning, export."""

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from agents.rl.config import NetConfig, Rules
+from agents.rl.config import NetConfig, SpaceSpec, TaskSpec
 from autopoly_env.errors import ConfigError
 from autopoly_env.operators import preset
 
@@ -20,24 +20,10 @@ HARMLESS = (  # a run may go on with other ones
 
 
 @dataclass(frozen=True)
-class CourseConfig:
-    """What is built, and for which price. Environments take the courses in turn."""
-
-    targets: str = "construction"  # "construction", "objects" or a folder of images
-    w_sc: float = 1.0  # price of an element, in points of r_all
-    difficulty: tuple[int, int] = (1, 5)  # of constructions
-    operators: str = "paper"  # that constructions are made with
-
-    def __post_init__(self) -> None:
-        if not self.w_sc >= 0.0:
-            raise ConfigError(f"w_sc {self.w_sc}: expected a price of at least 0")
-
-
-@dataclass(frozen=True)
 class EnvConfig:
     """The environments."""
 
-    courses: tuple[CourseConfig, ...] = (CourseConfig(), CourseConfig("objects", 0.3))
+    courses: tuple[TaskSpec, ...] = (TaskSpec(), TaskSpec("objects", 0.3))  # the tasks; environments take them in turn
     operators: str = "full"  # that the policy has
     resolution: int = 64  # pixels a side at which meshes are fitted and scored while learning
     obs_resolution: int = 64  # pixels a side of the observed pictures
@@ -51,19 +37,19 @@ class EnvConfig:
         if self.n_plays < 1:
             raise ConfigError(f"n_plays {self.n_plays}: expected at least 1")
         if not self.courses:
-            raise ConfigError("courses: expected at least one")
+            raise ConfigError("courses: expected at least one task")
         if not (self.reward_scale > 0.0 and self.illegal_penalty >= 0.0):
             raise ConfigError(f"{self}: expected a reward_scale above 0 and a penalty of at least 0")
-        self.rules()
+        self.spec()
 
-    def rules(self) -> Rules:
-        """What the policy is made for."""
+    def spec(self) -> SpaceSpec:
+        """The spaces that the policy is made for."""
         operators = tuple(operator.name for operator in preset(self.operators))
-        return Rules(operators, self.max_vertices, self.obs_resolution, self.max_steps)
+        return SpaceSpec(operators, self.max_vertices, self.obs_resolution, self.max_steps)
 
 
 @dataclass(frozen=True)
-class OptimConfig:
+class LearningRateConfig:
     """The learning rate: a linear warm-up, then a straight line down to `last`."""
 
     lr: float = 5e-4
@@ -136,10 +122,10 @@ class DqnOptions:
 
 @dataclass(frozen=True)
 class CurriculumConfig:
-    """Easy constructions first: the greatest difficulty grows from 1 to that of the course."""
+    """Easy constructions first: the greatest difficulty grows from 1 to that of the task."""
 
     enabled: bool = False
-    until: float = 0.5  # share of the training after which it is that of the course
+    until: float = 0.5  # share of the training after which it is that of the task
 
     def __post_init__(self) -> None:
         if not 0.0 < self.until <= 1.0:
@@ -147,7 +133,7 @@ class CurriculumConfig:
 
 
 @dataclass(frozen=True)
-class RunConfig:
+class RlRunConfig:
     """How a run is carried out."""
 
     seed: int = 0
@@ -159,7 +145,7 @@ class RunConfig:
     n_threads: int = 0  # of torch; 0: as it likes
     init: str = ""  # weights to begin with: a .safetensors file, or a .zip of SB3
     eval_every: int = 50_000  # steps
-    n_eval: int = 48  # targets of each course
+    n_eval: int = 48  # targets of each task
     eval_resolution: int = 128  # pixels a side
     save_every: int = 20_000  # steps
 
@@ -177,15 +163,15 @@ class TrainRlConfig:
     algorithm: Literal["maskable_ppo", "ppo", "a2c", "dqn"] = "maskable_ppo"
     net: NetConfig = field(default_factory=NetConfig)
     env: EnvConfig = field(default_factory=EnvConfig)
-    optim: OptimConfig = field(default_factory=OptimConfig)
+    optim: LearningRateConfig = field(default_factory=LearningRateConfig)
     ppo: PpoOptions = field(default_factory=PpoOptions)
     a2c: A2cOptions = field(default_factory=A2cOptions)
     dqn: DqnOptions = field(default_factory=DqnOptions)
     curriculum: CurriculumConfig = field(default_factory=CurriculumConfig)
-    run: RunConfig = field(default_factory=RunConfig)
+    run: RlRunConfig = field(default_factory=RlRunConfig)
 
     def options(self) -> PpoOptions | A2cOptions | DqnOptions:
-        """Of the algorithm."""
+        """The arguments of the algorithm."""
         if self.algorithm == "a2c":
             return self.a2c
         return self.dqn if self.algorithm == "dqn" else self.ppo

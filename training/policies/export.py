@@ -28,28 +28,28 @@ def card(meta: PolicyMeta, n: int, arguments: Sequence[str]) -> str:
     env = meta.training.get("env", {})
     init = meta.training.get("run", {}).get("init", "")
     begin = f"It went on from `{init}`." if init else "It began with random weights."
-    courses = "; ".join(f"{c['targets']} at w_sc {c['w_sc']:g}" for c in env.get("courses", []))
-    rules = ", ".join(f"{k} {v if not isinstance(v, list) else ' '.join(v)}" for k, v in meta.rules.items())
+    tasks = "; ".join(f"{task['targets']} at w_sc {task['w_sc']:g}" for task in env.get("courses", []))
+    spec = ", ".join(f"{k} {v if not isinstance(v, list) else ' '.join(v)}" for k, v in meta.spec.items())
     return f"""# {meta.algorithm}
 
 A policy that reads a mesh, its rendering and a target silhouette, and points at the next modelling action. {n}
 parameters. {begin}
 
-**Data.** Targets are made by `autopoly_env.targets`: {courses}. Seeds from 2^30 on were held out and are what the
+**Data.** Targets are made by `autopoly_env.targets`: {tasks}. Seeds from 2^30 on were held out and are what the
 metrics are of. No picture from outside was used.
 
 **Command.** `python -m training.train_rl {shlex.join(arguments)}`, seed {meta.training.get("run", {}).get("seed", 0)}.
 
-**Made for.** {rules}.
+**Made for.** {spec}.
 
-**Held-out metrics**, one greedy play for each target (`training/policies/exam.py` says what they are)
+**Held-out metrics**, one greedy episode on each target (`training/policies/evaluation.py` says what they are)
 
 | metric | value |
 |---|---|
 {rows}
 
-**Limits.** Pictures of {meta.rules.get("obs_resolution")} pixels a side do not show details below two pixels. The price
-of an element is an input, but only the prices above were trained. After {meta.rules.get("max_steps")} steps it stops.
+**Limits.** Pictures of {meta.spec.get("obs_resolution")} pixels a side do not show details below two pixels. The price
+of an element is an input, but only the prices above were trained. After {meta.spec.get("max_steps")} steps it stops.
 
 **Settings.** In the `.json` beside the weights, under `training`.
 """

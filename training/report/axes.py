@@ -1,8 +1,7 @@
-"""Axes of a chart: where a value lies, which values get a tick, and the frame around it all as SVG."""
+"""Axes of a chart: where a value lies, and which values get a tick."""
 
 import math
 from dataclasses import dataclass
-from html import escape
 
 WIDTH, HEIGHT = 540, 380  # user units of every chart; a screen shows about one pixel for each
 LEFT, RIGHT, TOP, BOTTOM = 58, 14, 12, 54  # margins that the ticks and labels need, large ones on phones included
@@ -32,6 +31,10 @@ class Axis:
             return _log_ticks(self.low, self.high)
         return _linear_ticks(self.low, self.high, 1.0 if self.is_whole else 0.0)
 
+    def labelled_ticks(self) -> list[tuple[float, str]]:
+        """Where each tick lies, and what stands at it."""
+        return [(self.place(tick), tick_label(tick)) for tick in self.ticks()]
+
 
 def x_axis(low: float, high: float, *, is_log: bool = False, is_whole: bool = False) -> Axis:
     """From left to right."""
@@ -58,29 +61,6 @@ def tick_label(value: float) -> str:
         if abs(value) >= size:
             return f"{value / (1e3 if letter == 'k' else 1e6):.4g}{letter}"
     return f"{value:.4g}"
-
-
-def frame(x: Axis, y: Axis, x_label: str, y_label: str, title: str, body: str) -> str:
-    """A chart: grid, ticks and labels with `body` inside them, as an `<svg>` whose colours the page's style gives."""
-    bottom, right = HEIGHT - BOTTOM, WIDTH - RIGHT
-    lines = [f'<path d="M{number(x.place(tick))} {TOP}V{bottom}"/>' for tick in x.ticks()]
-    lines += [f'<path d="M{LEFT} {number(y.place(tick))}H{right}"/>' for tick in y.ticks()]
-    words = [f'<text x="{number(x.place(tick))}" y="{bottom + 19}">{tick_label(tick)}</text>' for tick in x.ticks()]
-    words += [
-        f'<text class="left" x="{LEFT - 8}" y="{number(y.place(tick) + 4)}">{tick_label(tick)}</text>'
-        for tick in y.ticks()
-    ]
-    middle = number((TOP + bottom) / 2)
-    return "\n".join(
-        [
-            f'<svg class="chart" viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{escape(title)}">',
-            f'<g class="grid">{"".join(lines)}</g><g class="ticks">{"".join(words)}</g>',
-            f'<text class="label" x="{number((LEFT + right) / 2)}" y="{HEIGHT - 8}">{escape(x_label)}</text>',
-            f'<text class="label" transform="translate(15 {middle}) rotate(-90)">{escape(y_label)}</text>',
-            body,
-            "</svg>",
-        ]
-    )
 
 
 def _apart(low: float, high: float, is_log: bool) -> tuple[float, float]:

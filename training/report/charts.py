@@ -8,17 +8,11 @@ import numpy as np
 
 from autopoly_env.arrays import FloatArray
 from training.records import Outcome
-from training.report.axes import Axis, frame, number, x_axis, y_axis
+from training.report.axes import Axis, number, x_axis, y_axis
 from training.report.comparison import Comparison, Series
 from training.report.statistics import bootstrap_means
 
-MARKERS = (
-    '<circle r="4"/>',
-    '<path d="M-3.7-3.7h7.4v7.4h-7.4z"/>',
-    '<path d="M0-4.9L4.6 3.4H-4.6z"/>',
-    '<path d="M0-5.2L5.2 0 0 5.2-5.2 0z"/>',
-    '<path d="M0 4.9L4.6-3.4H-4.6z"/>',
-)
+N_MARKERS = 5  # in templates/charts.html
 N_COLOURS = 8
 N_POINTS = 72  # of a curve
 MOST_POINTS = 6000  # of a scatter; beyond, only every second, third, ... target is drawn
@@ -36,19 +30,62 @@ class Curves:
     high: FloatArray
 
 
+@dataclass(frozen=True)
+class Chart:
+    """A frame with its axes and labels."""
+
+    x: Axis
+    y: Axis
+    x_label: str
+    y_label: str
+    title: str
+
+
+@dataclass(frozen=True)
+class Point:
+    """Where a target of a series lies, in user units; `target` is its place in the comparison, -1 for a mean."""
+
+    series: int
+    x: float
+    y: float
+    target: int = -1
+
+
+@dataclass(frozen=True)
+class Scatter(Chart):
+    """r_sm against `value`: a point for every target and series, a larger one for each series' mean."""
+
+    value: str
+    points: list[Point]
+    means: list[Point]
+
+
+@dataclass(frozen=True)
+class BandedLine:
+    """A curve as paths of SVG: the line, its 95 % band, and where it ends."""
+
+    series: int
+    path: str
+    band: str
+    end: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Anytime(Chart):
+    """Mean r_all against `work` so far, a line for every series."""
+
+    work: str
+    lines: list[BandedLine]
+
+
 def colour_class(i: int) -> str:
     """The style class with the colour of series number i."""
     return f"s{i % N_COLOURS}"
 
 
 def marker(i: int) -> int:
-    """Which of MARKERS series number i has: colours come round again before the pairs of both do."""
-    return (i + i // N_COLOURS) % len(MARKERS)
-
-
-def marker_symbols() -> str:
-    """The markers, to be used as #m0, #m1, ..."""
-    return "".join(f'<g id="m{k}">{shape}</g>' for k, shape in enumerate(MARKERS))
+    """Which of the marks series number i has: colours come round again before the pairs of both do."""
+    return (i + i // N_COLOURS) % N_MARKERS
 
 
 def scatter_points(comparison: Comparison) -> list[tuple[int, int, Outcome]]:
@@ -63,19 +100,15 @@ def scatter_points(comparison: Comparison) -> list[tuple[int, int, Outcome]]:
     ]
 
 
-def scatter(comparison: Comparison, value: str) -> str:
-    """r_sm against "r_sc" or "r_si": a point for every target and series, a larger one for each series' mean."""
+def scatter(comparison: Comparison, value: str) -> Scatter:
+    """The scatter of "r_sc" or "r_si"."""
     spots = [(t, i, float(getattr(outcome, value)), outcome.r_sm) for t, i, outcome in scatter_points(comparison)]
     x, label = _complexity_axis(value, [at for *_, at, _ in spots] or [1.0])
     y = y_axis(_floor([r_sm for *_, r_sm in spots], 0.05), 1.0)
     aside = _lanes(len(comparison.series)) if x.is_whole else np.zeros(len(comparison.series))
-    points = [
-        f'<use href="#m{marker(i)}" class="point {colour_class(i)}" data-s="{i}" data-t="{t}"'
-        f' x="{number(x.place(at + aside[i]))}" y="{number(y.place(r_sm))}"/>'
-        for t, i, at, r_sm in spots
-    ]
-    points += _mean_points(comparison.series, value, x, y)
-    return frame(x, y, label, "r_sm: IoU", f"IoU against {value}", "\n".join(points))
+    points = [Point(i, x.place(at + aside[i]), y.place(r_sm), t) for t, i, at, r_sm in spots]
+    means = _mean_points(comparison.series, value, x, y)
+    return Scatter(x, y, label, "r_sm: IoU", f"IoU against {value}", value, points, means)
 
 
 def _complexity_axis(value: str, found: Sequence[float]) -> tuple[Axis, str]:
@@ -86,27 +119,26 @@ def _complexity_axis(value: str, found: Sequence[float]) -> tuple[Axis, str]:
     return x_axis(0.9 * low, 1.1 * high, is_log=True), "r_sc: vertices + edges + faces (log scale)"
 
 
-def anytime(curves: Curves, labels: Sequence[str], work: str) -> str:
-    """Mean r_all against refits or seconds so far, a line and its 95 % band for every series."""
+def anytime(curves: Curves, work: str) -> Anytime:
+    """The chart of the curves against "refits" or "seconds"."""
     known = curves.means[np.isfinite(curves.means)]
     x = x_axis(float(curves.grid[0]), float(curves.grid[-1]), is_log=True)
     y = y_axis(_floor(known.tolist(), 5.0), float(np.nanmax(curves.high, initial=1.0)))
-    bands, lines = [], []
-    for i in range(len(labels)):
-        shown = np.flatnonzero(np.isfinite(curves.means[i]))
-        if not shown.size:
-            continue
-        at = [number(x.place(curves.grid[k])) for k in shown]
-        middle, low, high = (
-            [f"{a} {number(y.place(v))}" for a, v in zip(at, values[i, shown], strict=True)]
-            for values in (curves.means, curves.low, curves.high)
-        )
-        own = f'class="{colour_class(i)}" data-s="{i}"'
-        bands.append(f'<path {own} d="M{"L".join(high + low[::-1])}Z"/>')
-        end = f'<use href="#m{marker(i)}" {own} x="{at[-1]}" y="{middle[-1].split()[1]}"/>'
-        lines.append(f'<path {own} d="M{"L".join(middle)}"/>{end}')
-    body = f'<g class="bands">{"".join(bands)}</g><g class="lines">{"".join(lines)}</g><path class="cursor"/>'
-    return frame(x, y, f"{work} (log scale)", "best r_all so far, mean over targets", f"r_all against {work}", body)
+    lines = [_line(curves, i, x, y) for i in range(len(curves.means)) if np.isfinite(curves.means[i]).any()]
+    label = "best r_all so far, mean over targets"
+    return Anytime(x, y, f"{work} (log scale)", label, f"r_all against {work}", work, lines)
+
+
+def _line(curves: Curves, i: int, x: Axis, y: Axis) -> BandedLine:
+    """The curve of series number i, where it is known."""
+    shown = np.flatnonzero(np.isfinite(curves.means[i]))
+    places = [x.place(at) for at in curves.grid[shown]]
+    middle, low, high = (
+        [f"{number(a)} {number(y.place(v))}" for a, v in zip(places, values[i, shown], strict=True)]
+        for values in (curves.means, curves.low, curves.high)
+    )
+    end = places[-1], y.place(curves.means[i, shown[-1]])
+    return BandedLine(i, f"M{'L'.join(middle)}", f"M{'L'.join(high + low[::-1])}Z", end)
 
 
 def curves_of(comparison: Comparison, column: int) -> Curves:
@@ -145,17 +177,13 @@ def _held(outcome: Outcome, grid: FloatArray, column: int) -> FloatArray:
     return np.where(index >= 0, best[np.maximum(index, 0)], np.nan)
 
 
-def _mean_points(series: Sequence[Series], value: str, x: Axis, y: Axis) -> list[str]:
+def _mean_points(series: Sequence[Series], value: str, x: Axis, y: Axis) -> list[Point]:
     points = []
     for i, one in enumerate(series):
         outcomes = [outcome for _, outcome in one.outcomes]
         if outcomes:
             at = x.place(float(np.mean([getattr(outcome, value) for outcome in outcomes])))
-            r_sm = y.place(float(np.mean([outcome.r_sm for outcome in outcomes])))
-            place = f"translate({number(at)} {number(r_sm)}) scale(2.1)"
-            points.append(
-                f'<use href="#m{marker(i)}" class="mean {colour_class(i)}" data-s="{i}" transform="{place}"/>'
-            )
+            points.append(Point(i, at, y.place(float(np.mean([outcome.r_sm for outcome in outcomes])))))
     return points
 
 

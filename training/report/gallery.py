@@ -8,7 +8,6 @@ import base64
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 from itertools import zip_longest
 from pathlib import Path
 
@@ -20,7 +19,6 @@ from autopoly_env.errors import AutoPolyError, SilhouetteError
 from autopoly_env.silhouette import Silhouette
 from training.records import Outcome, Record
 from training.report.axes import number
-from training.report.charts import colour_class, marker
 from training.report.comparison import MEANS, Comparison, Series
 
 SIZE = 100  # user units a side of the unit square
@@ -45,6 +43,47 @@ class Card:
         return float(np.mean(known)) if known else -np.inf
 
 
+@dataclass(frozen=True)
+class Drawing:
+    """A mesh as paths of SVG, SIZE user units a side."""
+
+    faces: str
+    edges: str
+    dots: str
+
+
+@dataclass(frozen=True)
+class Figure:
+    """What an agent made of a target; without a drawing `problem` says why there is none."""
+
+    series: int
+    label: str
+    record: Record
+    n_seeds: int  # of which this is the worst
+    is_best: bool  # of the card
+    drawing: Drawing | None
+    problem: str
+
+
+@dataclass(frozen=True)
+class ShownCard:
+    """A card as the page shows it."""
+
+    target: str
+    picture: str | None  # base64 of a PNG, white where the target is
+    figures: list[Figure]
+
+
+@dataclass(frozen=True)
+class Gallery:
+    """The cards, and the measures of their pictures in user units."""
+
+    cards: list[ShownCard]
+    size: int = SIZE
+    margin: int = MARGIN
+    side: int = SIZE + 2 * MARGIN
+
+
 def worst_cards(comparison: Comparison, n: int) -> list[Card]:
     """The n targets that are worst in turn for all series together and for each of them; the worst mean first."""
     totals = [series.by_target(MEANS["r_all"]) for series in comparison.series]
@@ -58,11 +97,6 @@ def worst_cards(comparison: Comparison, n: int) -> list[Card]:
     in_turn = [card.target for turn in zip_longest(order, *own) for card in turn if card is not None]
     chosen = set(list(dict.fromkeys(in_turn))[:n])
     return [card for card in order if card.target in chosen]
-
-
-def gallery_html(comparison: Comparison, cards: Sequence[Card]) -> str:
-    """The cards as HTML; their pictures of targets are masks #t0, #t1, ..."""
-    return "\n".join(_card_html(comparison, card, i) for i, card in enumerate(cards))
 
 
 def _badness(card: Card, i: int) -> float:
@@ -83,80 +117,39 @@ def _total(record: Record) -> float:
     return -np.inf if record.outcome is None else record.outcome.r_all
 
 
-def _card_html(comparison: Comparison, card: Card, i: int) -> str:
-    picture = _target_png(comparison, card)
-    mask = "" if picture is None else f'<image width="{SIZE}" height="{SIZE}" href="data:image/png;base64,{picture}"/>'
+def gallery_of(comparison: Comparison, cards: Sequence[Card]) -> Gallery:
+    """What the page shows of the cards."""
+    return Gallery([_shown_card(comparison, card) for card in cards])
+
+
+def _shown_card(comparison: Comparison, card: Card) -> ShownCard:
     best = max((total for total in card.totals if total is not None), default=None)
     figures = [
-        _figure_html(series, record, i, k, is_best=total is not None and total == best)
+        _figure(series, record, k, is_best=total is not None and total == best)
         for k, (series, record, total) in enumerate(zip(comparison.series, card.records, card.totals, strict=True))
         if record is not None
     ]
-    lost = "" if picture else '<p class="note">the picture of this target is missing</p>'
-    return (
-        f'<article class="card" data-i="{i}"><header><svg viewBox="{_view()}" aria-hidden="true"><defs>'
-        f'<mask id="t{i}" style="mask-type:luminance">{mask}</mask></defs>'
-        f"{_around()}"
-        f'<rect class="target" width="{SIZE}" height="{SIZE}" mask="url(#t{i})"/></svg>'
-        f"<h3>{escape(card.target)}</h3>{lost}</header>"
-        f'<div class="figures">{"".join(figures)}</div></article>'
-    )
+    return ShownCard(card.target, _target_png(comparison, card), figures)
 
 
-def _figure_html(series: Series, record: Record, i: int, k: int, *, is_best: bool) -> str:
-    head = (
-        f'<figcaption class="{colour_class(k)}"><svg class="key" viewBox="-7 -7 14 14" aria-hidden="true">'
-        f'<use href="#m{marker(k)}"/></svg><b>{escape(series.label)}</b>'
-        f"{'<i>best</i>' if is_best else ''}{_seed_note(series, record)}</figcaption>"
-    )
-    outcome = record.outcome
-    if outcome is None:
-        return f'<figure data-s="{k}">{head}<p class="failed">{escape(record.error or "failed")}</p></figure>'
-    numbers = (
-        f"<dl><div><dt>r_all</dt><dd>{outcome.r_all:.2f}</dd></div><div><dt>r_sm</dt><dd>{outcome.r_sm:.4f}</dd></div>"
-        f"<div><dt>r_sc</dt><dd>{outcome.r_sc}</dd></div><div><dt>r_si</dt><dd>{outcome.r_si}</dd></div></dl>"
-    )
-    return f'<figure data-s="{k}">{head}{_pictures(outcome, i, k)}{numbers}</figure>'
-
-
-def _seed_note(series: Series, record: Record) -> str:
+def _figure(series: Series, record: Record, k: int, *, is_best: bool) -> Figure:
     n_seeds = sum(other.target == record.target for other in series.records)
-    return "" if n_seeds == 1 else f"<small>worst of {n_seeds} seeds: {record.seed}</small>"
+    drawing, problem = (None, "") if record.outcome is None else _drawn(record.outcome)
+    return Figure(k, series.label, record, n_seeds, is_best, drawing, problem)
 
 
-def _pictures(outcome: Outcome, i: int, k: int) -> str:
-    """The mesh over its target, and the difference between the two."""
+def _drawn(outcome: Outcome) -> tuple[Drawing | None, str]:
+    """The drawing of a mesh, or why there is none."""
     try:
         mesh = outcome.mesh.polymesh()
     except AutoPolyError as error:
-        return f'<p class="failed">{escape(str(error))}</p>'
+        return None, str(error)
     if len(mesh.topology.half_edges) > MOST_CORNERS:
-        return f'<p class="failed">{len(mesh.vertices)} vertices are too many for a picture</p>'
-    name = f"g{i}-{k}"
+        return None, f"{len(mesh.vertices)} vertices are too many for a picture"
     places = [f"{number(SIZE * x)} {number(SIZE * y)}" for x, y in mesh.vertices.tolist()]
     faces = "".join(f"M{'L'.join(places[v] for v in face)}z" for face in mesh.faces)
     edges = "".join(f"M{places[a]}L{places[b]}" for a, b in mesh.edges.tolist())
-    dots = "".join(f"M{place}h0" for place in places)
-    square, around = f'<rect width="{SIZE}" height="{SIZE}"', _around()
-    return (
-        f'<div class="pair"><svg viewBox="{_view()}" role="img" aria-label="mesh"><defs><path id="{name}" d="{faces}"/>'
-        f'</defs>{around}{square} class="ghost" mask="url(#t{i})"/>'
-        f'<use href="#{name}" class="faces"/><path class="edges" d="{edges}"/><path class="dots" d="{dots}"/></svg>'
-        f'<svg viewBox="{_view()}" role="img" aria-label="difference">{around}'
-        f'<use href="#{name}" class="excess"/>{square} class="missing" mask="url(#t{i})"/>'
-        f'<g mask="url(#t{i})"><use href="#{name}" class="match"/></g></svg></div>'
-    )
-
-
-def _view() -> str:
-    side = SIZE + 2 * MARGIN
-    return f"{-MARGIN} {-MARGIN} {side} {side}"
-
-
-def _around() -> str:
-    """The square that a picture stands in."""
-    side = SIZE + 2 * MARGIN
-    return f'<rect x="{-MARGIN}" y="{-MARGIN}" width="{side}" height="{side}" class="frame"/>'
+    return Drawing(faces, edges, "".join(f"M{place}h0" for place in places)), ""
 
 
 def _target_png(comparison: Comparison, card: Card) -> str | None:

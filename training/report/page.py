@@ -2,30 +2,19 @@
 
 import json
 from collections.abc import Sequence
-from html import escape
-from pathlib import Path
-from string import Template
 from typing import Any
 
 import numpy as np
 
 from training.report.axes import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH
-from training.report.charts import (
-    Curves,
-    anytime,
-    colour_class,
-    curves_of,
-    marker,
-    marker_symbols,
-    scatter,
-    scatter_points,
-)
+from training.report.charts import Curves, anytime, curves_of, scatter, scatter_points
 from training.report.comparison import MEANS, Comparison, Row
-from training.report.gallery import Card, gallery_html, worst_cards
-from training.report.tables import html_table
+from training.report.gallery import Card, gallery_of, worst_cards
+from training.report.headline import page_table
+from training.report.rendering import own_text, render
 
-HERE = Path(__file__).parent
 WORK = ("refits", "seconds")
+COMPLEXITY = ("r_sc", "r_si")
 
 
 def page_html(comparison: Comparison, rows: Sequence[Row], n_cards: int, title: str) -> str:
@@ -33,80 +22,33 @@ def page_html(comparison: Comparison, rows: Sequence[Row], n_cards: int, title: 
     cards = worst_cards(comparison, n_cards)
     labels = [series.label for series in comparison.series]
     curves = {work: curves_of(comparison, column) for column, work in enumerate(WORK)}
-    return Template(_read("page.html")).substitute(
-        title=escape(title),
-        style=_read("style.css"),
-        script=_read("script.js"),
-        symbols=marker_symbols(),
-        summary=escape(_summary(comparison)),
-        notes=_notes_html(comparison.notes),
-        chips="".join(_chip(label, i) for i, label in enumerate(labels)),
-        baseline=escape(labels[comparison.baseline]),
-        table=html_table(rows, comparison.baseline),
-        scatters="".join(
-            f'<figure class="scatter" data-value="{value}">{scatter(comparison, value)}</figure>'
-            for value in ("r_sc", "r_si")
-        ),
-        curves="".join(
-            f'<figure class="anytime" data-work="{work}">{anytime(curves[work], labels, work)}</figure>'
-            for work in WORK
-        ),
-        scatter_note=_scatter_note(comparison),
-        gallery_note=escape(_gallery_note(len(cards), len(comparison.targets))),
-        options="".join(f'<option value="{i}">{escape(label)}</option>' for i, label in enumerate(labels)),
-        n_series=len(labels),
-        gallery=gallery_html(comparison, cards),
-        runs="".join(_run_html(run.name, str(run.folder), run.suite) for run in comparison.runs),
-        data=script_json(_data(comparison, labels, cards, curves)),
+    return render(
+        "page.html",
+        title=title,
+        style=own_text("style.css"),
+        script=own_text("script.js"),
+        summary=_summary(comparison),
+        notes=comparison.notes,
+        labels=labels,
+        baseline=labels[comparison.baseline],
+        table=page_table(rows, comparison.baseline),
+        scatters=[scatter(comparison, value) for value in COMPLEXITY],
+        n_shown=len(scatter_points(comparison)),
+        n_outcomes=sum(len(series.outcomes) for series in comparison.series),
+        curves=[anytime(curves[work], work) for work in WORK],
+        n_targets=len(comparison.targets),
+        gallery=gallery_of(comparison, cards),
+        runs=[
+            (run.name, str(run.folder), json.dumps(run.suite, indent=2, ensure_ascii=False)) for run in comparison.runs
+        ],
+        data=_data(comparison, labels, cards, curves),
     )
-
-
-def script_json(value: Any) -> str:
-    """JSON that may stand in a `<script>`, whatever text is in it."""
-    text = json.dumps(value, allow_nan=False, separators=(",", ":"))
-    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
-
-
-def _read(name: str) -> str:
-    return (HERE / name).read_text(encoding="utf-8")
 
 
 def _summary(comparison: Comparison) -> str:
     n_targets = len(comparison.targets)
     counts = ((len(comparison.series), "agent"), (n_targets, "target"), (len(comparison.runs), "run"))
     return ", ".join(f"{n} {word}{'' if n == 1 else 's'}" for n, word in counts)
-
-
-def _scatter_note(comparison: Comparison) -> str:
-    n_shown, n = len(scatter_points(comparison)), sum(len(series.outcomes) for series in comparison.series)
-    return "" if n_shown == n else f" {n_shown} of {n} small marks are drawn."
-
-
-def _gallery_note(n_cards: int, n_targets: int) -> str:
-    if n_cards == n_targets:
-        return "Every agent’s mesh of each target: over the target, and how it differs from it."
-    return (
-        f"The {n_cards} worst of {n_targets} targets, in turn those of all agents together and of each of them: every "
-        "agent’s mesh over the target, and how it differs from it."
-    )
-
-
-def _notes_html(notes: Sequence[str]) -> str:
-    return f'<ul class="notes">{"".join(f"<li>{escape(note)}</li>" for note in notes)}</ul>' if notes else ""
-
-
-def _chip(label: str, i: int) -> str:
-    return (
-        f'<button type="button" data-chip="{i}" aria-pressed="true" class="{colour_class(i)}">'
-        f'<svg class="key" viewBox="-7 -7 14 14" aria-hidden="true"><use href="#m{marker(i)}"/></svg>'
-        f"<span>{escape(label)}</span></button>"
-    )
-
-
-def _run_html(name: str, folder: str, suite: dict[str, Any]) -> str:
-    settings = json.dumps(suite, indent=2, ensure_ascii=False)
-    where = f"<small>{escape(folder)}</small>"
-    return f"<details><summary><b>{escape(name)}</b> {where}</summary><pre>{escape(settings)}</pre></details>\n"
 
 
 def _data(
@@ -129,8 +71,7 @@ def _data(
             for card in cards
         ],
         "points": {
-            value: [(getattr(outcome, value), _known(outcome.r_sm)) for *_, outcome in points]
-            for value in ("r_sc", "r_si")
+            value: [(getattr(outcome, value), _known(outcome.r_sm)) for *_, outcome in points] for value in COMPLEXITY
         },
         "curves": {
             work: {
