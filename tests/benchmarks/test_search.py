@@ -17,8 +17,8 @@ from autopoly_env.refit import refit_kernels
 from benchmarks import search, search_cases, search_rows
 from benchmarks.curve_picture import draw_curves
 from benchmarks.search_cases import Case, Found, Records, Results, best_of_plays, made, target_of
-from tests.agents.test_agents import simulator
 from tests.helpers.paths import DOCS
+from tests.helpers.solving import simulator
 from training.report.statistics import Interval
 
 PAGE = DOCS / "search.md"

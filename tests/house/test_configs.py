@@ -11,8 +11,8 @@ from agents.baselines.beam import BeamConfig
 from agents.configs import load_agent, load_config
 from agents.registry import AGENTS, make_agent
 from autopoly_env.errors import ConfigError
-from tests.agents.test_agents import simulator
 from tests.helpers.paths import ROOT
+from tests.helpers.solving import simulator
 
 FOLDER = ROOT / "configs" / "agent"
 NAMES = ("mcts", "mcts_paper", "greedy", "beam", "trace", "climb")

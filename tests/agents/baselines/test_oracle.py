@@ -13,8 +13,9 @@ from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import is_sane
 from autopoly_env.operators import STOP
 from autopoly_env.simulator import Simulator, State
-from tests.agents.test_agents import TARGETS, VALLEY, VALLEY_CHILDREN, Tree, assert_consistent, interrupt_at, simulator
 from tests.helpers.drawings import HOUSE, SQUARE, painted
+from tests.helpers.solving import TARGETS, assert_consistent, interrupt_at, simulator
+from tests.helpers.tree import VALLEY, VALLEY_CHILDREN, Tree
 
 
 def played(tree: Tree, **options: Any) -> tuple[str, str]:

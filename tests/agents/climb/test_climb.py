@@ -17,7 +17,7 @@ from autopoly_env.mesh import PolyMesh
 from autopoly_env.score import ScoreWeights
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator
-from tests.agents.test_agents import simulator
+from tests.helpers.solving import simulator
 
 BOX = np.array([(0.2, 0.2), (0.8, 0.2), (0.8, 0.8), (0.2, 0.8)])
 

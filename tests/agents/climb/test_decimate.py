@@ -16,8 +16,8 @@ from autopoly_env.errors import ConfigError
 from autopoly_env.operators import STOP
 from autopoly_env.score import ScoreWeights
 from autopoly_env.simulator import Simulator
-from tests.agents.test_agents import TARGETS, assert_consistent, interrupt_at, simulator
 from tests.helpers.drawings import FRAME, HOUSE, L_SHAPE, SQUARE, painted
+from tests.helpers.solving import TARGETS, assert_consistent, interrupt_at, simulator
 
 BOX = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
 DENTED = np.insert(BOX, 1, (0.5, 0.1), axis=0)  # a pentagon: the vertex in its top edge spans the least area

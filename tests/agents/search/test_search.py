@@ -26,8 +26,8 @@ from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import STOP, Action
 from autopoly_env.score import Score
 from autopoly_env.simulator import Simulator, State
-from tests.agents.test_agents import TARGETS, assert_consistent, interrupt_at, simulator
 from tests.helpers.drawings import SQUARE, painted
+from tests.helpers.solving import TARGETS, assert_consistent, interrupt_at, simulator
 
 
 class Game:
