@@ -1,5 +1,7 @@
-"""The example silhouettes: what is committed is what the script draws, and what their README says."""
+"""The examples: silhouettes are what the script draws and what their README says; the short agent beats chance."""
 
+import ast
+import runpy
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +10,8 @@ from PIL import Image
 from skimage.measure import label
 
 from examples import draw_examples
+from tests.helpers.environments import play
+from tests.helpers.paths import ROOT
 
 EXAMPLES = Path(draw_examples.__file__).parent
 PICTURES = sorted(EXAMPLES.glob("*.png"))
@@ -52,3 +56,18 @@ def test_picture__has_the_pieces_and_holes_that_the_readme_says(picture: Path) -
     n_pieces = label(inside, connectivity=2).max()
     n_holes = label(~inside, connectivity=1).max() - 1  # the surroundings are one region of the background
     assert (n_pieces, n_holes) == readme_rows()[picture.name]
+
+
+def test_agent_in_fifteen_lines__beats_random_play(capsys: pytest.CaptureFixture[str]) -> None:
+    path = ROOT / "examples" / "agent_in_fifteen_lines.py"
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    first = tree.body[1].lineno  # after the docstring
+    assert sum(bool(line.strip()) for line in path.read_text(encoding="utf-8").splitlines()[first - 1 :]) <= 15
+    env = runpy.run_path(str(path))["env"]
+    gains = [float(line.split("+")[1]) for line in capsys.readouterr().out.splitlines()]
+    at_random = []
+    for seed in range(len(gains)):
+        _, start = env.reset(seed=seed)
+        at_random.append(play(env, 20, seed)[-1][-1]["best_r_all"] - start["r_all"])
+    assert np.mean(gains) > 2.0 * np.mean(at_random)
+    assert min(gains) >= 0.0
