@@ -1,11 +1,14 @@
 """Settings of every test run: one Numba thread a process, property tests that neither race nor wander, no litter."""
 
 import os
+from collections.abc import Iterator
 
 os.environ.setdefault("NUMBA_NUM_THREADS", "1")  # read when numba is imported, which no test has done yet
 
 import pytest
 from hypothesis import settings
+
+from tests.helpers.browser import Browser
 
 settings.register_profile("autopoly", deadline=None, derandomize="CI" in os.environ)
 settings.load_profile("autopoly")
@@ -15,3 +18,10 @@ settings.load_profile("autopoly")
 def sb3_logs(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
     """Stable-Baselines3 makes a folder for logs that nobody asked for; let it be among the temporary ones."""
     monkeypatch.setenv("SB3_LOGDIR", str(tmp_path_factory.getbasetemp() / "sb3"))
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    """A real one, for tests that are marked `needs_browser`."""
+    with Browser() as running:
+        yield running

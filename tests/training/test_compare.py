@@ -237,12 +237,6 @@ def test_picture__outside_the_run_is_not_read(run: Run, tmp_path: Path) -> None:
 # --- the page, in a browser
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with Browser() as running:
-        yield running
-
-
 def names(page: Page, selector: str) -> list[str]:
     """The texts of all shown elements."""
     shown = f"[...document.querySelectorAll({json.dumps(selector)})].filter(e => e.getClientRects().length)"
