@@ -1,12 +1,16 @@
 """How beam search and greedy search go about it, on trees drawn by hand."""
 
+import numpy as np
 import pytest
 
 from agents.base import Decision
 from agents.budget import Budget
 from agents.registry import make_agent
 from autopoly_env.operators import STOP
+from autopoly_env.score import ScoreWeights
+from autopoly_env.sequence import Lesson
 from autopoly_env.simulator import Simulator
+from tests.helpers.drawings import BOTTLE, painted
 from tests.helpers.solving import TARGETS, quick, simulator
 from tests.helpers.tree import VALLEY, VALLEY_CHILDREN, Tree
 
@@ -71,3 +75,15 @@ def test_search_act__takes_the_best_child_and_stops_where_none_is_better() -> No
     roof = game.transition(state, decision.action)
     assert decision.action.operator == "edge_subdivide" and roof.score.total == decision.value
     assert roof.done == "matched" and agent.act(game, roof) == Decision(STOP, value=roof.score.total)
+
+
+def test_greedy__moves_less_under_the_weight_for_little() -> None:
+    silhouette = painted(BOTTLE, 128)
+    free, dear = (
+        make_agent("greedy").solve(Simulator(silhouette, weights=ScoreWeights(w_locality=w)), Budget(300))
+        for w in (0.0, 0.5)
+    )
+    assert Lesson.of(dear.sequence).moved <= 0.5 * Lesson.of(free.sequence).moved
+    assert dear.score.total > free.score.total - 0.3
+    assert dear.score.total == pytest.approx(100 * dear.score.iou - 0.3 * dear.score.complexity)  # nothing is off
+    assert np.isfinite(dear.mesh.vertices).all()

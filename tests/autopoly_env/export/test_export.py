@@ -1,10 +1,7 @@
-"""Writers: OBJ and SVG read back, contact sheets counted, and files that are whole or not there."""
+"""Writers: OBJ and SVG read back, contact sheets counted."""
 
 import base64
-import errno
 import io
-import os
-import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
 from typing import Any
@@ -16,13 +13,13 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from autopoly_env import viewer
-from autopoly_env.errors import ConfigError, OutputError
-from autopoly_env.export import contact_sheet, save_png, sheet, to_obj, to_svg
-from autopoly_env.files import write_atomically
+from autopoly_env.errors import ConfigError, MeshError
+from autopoly_env.export import contact_sheet, from_obj, load_obj, save_png, sheet, to_obj, to_svg
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import OPERATORS, Action
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import Silhouette
+from tests.helpers.shapes import hourglass, polygon, star
 
 QUAD = PolyMesh.rectangle(0.25, 0.125, 0.75, 0.5)
 RING = OPERATORS["face_delete"].apply(PolyMesh.grid(3, 0.1, 0.1, 0.9, 0.9), 4)  # 8 quads around a hole
@@ -193,74 +190,39 @@ def test_png__comes_back_as_it_was_saved(tmp_path: Path) -> None:
         np.testing.assert_array_equal(np.asarray(saved), np.asarray(page))
 
 
-# --- files ---
+# --- OBJ, read ---
 
 
-@pytest.mark.parametrize(("data", "stored"), [("ümlaut\n", "ümlaut\n".encode()), (b"\x00\xff", b"\x00\xff")])
-def test_write__makes_folders_and_replaces_what_was_there(tmp_path: Path, data: str | bytes, stored: bytes) -> None:
-    path = tmp_path / "a" / "b" / "file"
-    assert write_atomically(path, b"old and longer") == path == write_atomically(str(path), data)
-    assert path.read_bytes() == stored
-    assert [p.name for p in path.parent.iterdir()] == ["file"]
+def test_obj__comes_back_with_its_polygons() -> None:
+    for mesh in (PolyMesh.grid(2, 0.1, 0.2, 0.8, 0.9), hourglass(), polygon(star(3, 9))):
+        read = from_obj(to_obj(mesh))
+        assert read.faces == mesh.faces
+        np.testing.assert_allclose(read.vertices, mesh.vertices, rtol=0, atol=1e-15)
 
 
-def test_write__follows_a_link(tmp_path: Path) -> None:
-    (tmp_path / "folder").mkdir()
-    link = tmp_path / "latest"
-    link.symlink_to(tmp_path / "folder" / "file")
-    write_atomically(link, "text")
-    assert link.is_symlink() and (tmp_path / "folder" / "file").read_text() == "text"
+def test_obj__of_other_programs_is_read() -> None:
+    text = "mtllib a.mtl\no quad\nv 0.1 0.1 5\nv .9 .1 0 1.0\nv 0.9 0.9 0\nv 1e-1 0.9 0\nvn 0 0 1\nvt 0 0\ns off\n"
+    for face in ("f 1/1/1 2/1/1 3/1/1 4/1/1", "f -4 -3 -2 -1", "f 4//1 3//1 2//1 1//1 # seen from behind"):
+        mesh = from_obj(text + face)
+        assert mesh.face_areas().tolist() == [pytest.approx(0.64)]
+        assert mesh.vertices[0].tolist() == [0.1, 0.9]
 
 
 @pytest.mark.parametrize(
-    ("failure", "raised"), [(OSError(errno.ENOSPC, "No space"), OutputError), (KeyboardInterrupt(), KeyboardInterrupt)]
+    ("text", "complaint"),
+    [
+        ("", "0 vertices and 0 faces"),
+        ("v 0 0 0\nf 1 2 3", "line 2 of the OBJ text, 'f 1 2 3': vertex 2 is not among the 1 so far"),
+        ("v 0 0", "expected v x y z"),
+        ("v 0 zero 0", "could not convert"),
+        ("v 0 0 0\nv 1 0 0\nf 1 2", "at least 3 corners"),
+        ("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 0 1 2", "vertex 0 is not among"),
+        ("v nan 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3", "vertex 0 is not finite"),
+        ("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3", "vertex 3 belongs to no face"),
+    ],
 )
-def test_write__leaves_the_old_file_and_nothing_else_when_it_fails(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failure: BaseException, raised: type[BaseException]
-) -> None:
-    path = tmp_path / "file"
-    path.write_text("old")
-
-    def fail(part: Any, _target: Any) -> None:
-        assert Path(part).parent == tmp_path and Path(part).read_text() == "new"
-        raise failure
-
-    monkeypatch.setattr(os, "replace", fail)
-    with pytest.raises(raised):
-        write_atomically(path, "new")
-    assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("file", "old")]
-
-
-def test_write__removes_the_half_that_fitted_on_a_full_disk(tmp_path: Path) -> None:
-    resource = pytest.importorskip("resource")
-    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (65536, limits[1]))
-    try:
-        with pytest.raises(OutputError, match=r"cannot write .*big.* \(File too large\)"):
-            write_atomically(tmp_path / "big", bytes(1 << 20))
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
-    assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize("place", ["file/below", "folder"])
-def test_write__refuses_an_impossible_place_in_one_line(tmp_path: Path, place: str) -> None:
-    (tmp_path / "file").touch()
-    (tmp_path / "folder").mkdir()
-    with pytest.raises(OutputError, match=re.escape(f"cannot write {tmp_path / place} (")) as caught:
-        write_atomically(tmp_path / place, "text")
-    assert "\n" not in str(caught.value)
-    assert sorted(p.name for p in tmp_path.rglob("*")) == ["file", "folder"]
-
-
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write anywhere")
-def test_write__refuses_an_unwritable_folder(tmp_path: Path) -> None:
-    tmp_path.chmod(0o500)
-    with pytest.raises(OutputError, match="Permission denied"):
-        write_atomically(tmp_path / "file", "text")
-
-
-@pytest.mark.skipif(not Path("/dev/null").is_char_device(), reason="there is no /dev/null")
-def test_write__never_replaces_a_device() -> None:
-    with pytest.raises(OutputError, match="no ordinary file"):
-        write_atomically("/dev/null", "text")
+def test_obj__that_is_broken_is_refused_in_one_line(text: str, complaint: str, tmp_path: Path) -> None:
+    (tmp_path / "broken.obj").write_text(text)
+    with pytest.raises(MeshError, match=complaint) as caught:
+        load_obj(tmp_path / "broken.obj")
+    assert "\n" not in str(caught.value) and "broken.obj" in str(caught.value)

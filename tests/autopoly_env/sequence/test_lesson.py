@@ -1,43 +1,20 @@
-"""What a sequence is worth as a lesson, on constructions whose figures can be told by hand."""
+"""A construction judged as a lesson, and the weight that lets steps leave old vertices alone."""
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
-from agents.budget import Budget
-from agents.finish.settle import settle
-from agents.registry import make_agent
 from autopoly_env.conformance import check_simulator
 from autopoly_env.errors import ConfigError
-from autopoly_env.mesh import PolyMesh, is_sane
-from autopoly_env.operators import OPERATORS, Action
+from autopoly_env.mesh import is_sane
+from autopoly_env.operators import OPERATORS
 from autopoly_env.score import ScoreWeights
-from autopoly_env.sequence import ConstructionSequence, Lesson
+from autopoly_env.sequence import Lesson
 from autopoly_env.sequence.lesson import moves, share_moved
 from autopoly_env.simulator import Simulator
 from tests.helpers.constructions import house
-from tests.helpers.drawings import BOTTLE, FRAME, HOUSE, noise, painted
-from tests.helpers.sequences import played
-
-SQUARE = PolyMesh.rectangle(0.25, 0.25, 0.75, 0.75)
-
-
-def score(iou: float) -> dict[str, float]:
-    return {"iou": iou, "complexity": 9, "self_intersections": 0, "total": 100 * iou}
-
-
-def subdivided(*steps: tuple[dict[int, tuple[float, float]], float]) -> ConstructionSequence:
-    """Subdivisions of edge 0 of a square with IoU 0.5, each with where vertices go in it, and its IoU."""
-    mesh, transitions = SQUARE, []
-    for places, iou in steps:
-        mesh = OPERATORS["edge_subdivide"].apply(mesh, 0)
-        vertices = mesh.vertices.copy()
-        for name, place in places.items():
-            vertices[mesh.vertex_index(name)] = place
-        mesh = mesh.with_vertices(vertices)
-        transitions.append((Action("edge_subdivide", 0), None, mesh, score(iou)))
-    return ConstructionSequence.record({}, SQUARE, score(0.5), transitions)
+from tests.helpers.drawings import BOTTLE, FRAME, HOUSE, painted
+from tests.helpers.lessons import SQUARE, subdivided
 
 
 def test_lesson__of_no_steps_is_its_start() -> None:
@@ -114,45 +91,3 @@ def test_w_locality__makes_a_step_leave_old_vertices_alone() -> None:
 def test_w_locality__keeps_to_the_rules_of_a_simulator(symmetry: float | None) -> None:
     weights = ScoreWeights(w_locality=3.0)
     check_simulator(Simulator(painted(FRAME), resolution=32, weights=weights, symmetry=symmetry, max_steps=6))
-
-
-def test_settle__changes_nothing_without_the_weight() -> None:
-    sequence = played(3)
-    assert settle(sequence, Simulator(noise(3), resolution=32)) is sequence
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_settle__moves_less_towards_the_same_mesh(seed: int) -> None:
-    sequence = played(seed).trim(8)
-    game = Simulator(noise(seed), resolution=32, weights=ScoreWeights(w_locality=50.0))
-    settled = settle(sequence, game)
-    assert settled.final() == sequence.final()
-    assert ConstructionSequence.from_json(settled.to_json()).final() == sequence.final()
-    assert [step.operator for step in settled.steps] == [step.operator for step in sequence.steps]
-    assert [step.score for step in settled.steps] == [game.final_score(m).as_dict() for m in settled.meshes()[1:]]
-    assert all(
-        is_sane(after) or not is_sane(mesh) for mesh, after in zip(sequence.meshes(), settled.meshes(), strict=True)
-    )
-    assert Lesson.of(settled).moved < Lesson.of(sequence).moved
-
-
-def test_settle__puts_a_move_off_or_brings_it_forward_where_it_costs_nothing() -> None:
-    there_and_back = subdivided(({2: (0.8, 0.8)}, 0.6), ({2: (0.75, 0.75)}, 0.7))
-    silhouette = painted(HOUSE)
-    game = Simulator(silhouette, weights=ScoreWeights(w_locality=1e6))
-    settled = settle(there_and_back, game)
-    assert Lesson.of(settled).moved == 0.0 and settled.final() == there_and_back.final()
-    given = Simulator(silhouette, weights=ScoreWeights(w_locality=1e6), start=SQUARE)
-    assert settle(subdivided(({2: (0.8, 0.8)}, 0.6)), given).start == SQUARE
-
-
-def test_greedy__moves_less_under_the_weight_for_little() -> None:
-    silhouette = painted(BOTTLE, 128)
-    free, dear = (
-        make_agent("greedy").solve(Simulator(silhouette, weights=ScoreWeights(w_locality=w)), Budget(300))
-        for w in (0.0, 0.5)
-    )
-    assert Lesson.of(dear.sequence).moved <= 0.5 * Lesson.of(free.sequence).moved
-    assert dear.score.total > free.score.total - 0.3
-    assert dear.score.total == pytest.approx(100 * dear.score.iou - 0.3 * dear.score.complexity)  # nothing is off
-    assert np.isfinite(dear.mesh.vertices).all()
