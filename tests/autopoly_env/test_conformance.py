@@ -1,6 +1,5 @@
 """The public checks: they pass what the project ships, and name what is broken in what breaks a rule."""
 
-import doctest
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -203,7 +202,3 @@ BROKEN_INFOS = {
 def test_broken_env__is_caught_with_the_rule_it_breaks(rule: str) -> None:
     with pytest.raises(ConformanceError, match=rule):
         check_env(Altered(AutoPolyEnv(**SMALL), BROKEN_INFOS[rule]))
-
-
-def test_example_of_the_module__runs() -> None:
-    assert doctest.testmod(conformance).failed == 0

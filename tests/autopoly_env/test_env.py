@@ -1,6 +1,5 @@
 """AutoPolyEnv: what Gymnasium asks of it, what it pays, when it ends."""
 
-import doctest
 import inspect
 import re
 import subprocess
@@ -39,12 +38,6 @@ def test_own_check__passes(name: str) -> None:
 def test_folder_id__asks_for_the_folder() -> None:
     with pytest.raises(ConfigError, match="targets=FOLDER"):
         gymnasium.make("autopoly_env:AutoPolyFolder-v0")
-
-
-def test_example_of_the_class__runs() -> None:
-    parts = doctest.DocTestFinder().find(AutoPolyEnv, "AutoPolyEnv", module=autopoly_env.env)
-    assert sum(doctest.DocTestRunner().run(part).attempted for part in parts) >= 5
-    assert all(not doctest.DocTestRunner().run(part).failed for part in parts)
 
 
 def test_class_docstring__has_gymnasiums_headings() -> None:

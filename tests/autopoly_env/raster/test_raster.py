@@ -1,6 +1,5 @@
 """The rasteriser: coverage against shapely and exact fractions, derivatives, batches, and a clean workspace."""
 
-import doctest
 from collections.abc import Iterator
 from fractions import Fraction
 from itertools import pairwise
@@ -64,10 +63,6 @@ def assert_clean(resolution: int, n_edges: int) -> None:
 
 
 # --- coverage, by hand ---
-
-
-def test_docstring__shows_what_coverage_returns() -> None:
-    assert doctest.testmod(raster) == (0, 1)
 
 
 def test_coverage__of_a_triangle_over_half_the_image() -> None:
