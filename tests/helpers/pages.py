@@ -4,6 +4,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import dedent
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,8 @@ def _files() -> list[Path]:
 
 PAGES = {path.relative_to(ROOT).as_posix(): path for path in _files()}
 _BLOCK = re.compile(
-    r"(?:<!-- not run: (?P<reason>[^>]*) -->\n+)?^```python\n(?P<code>.*?)^```$", re.DOTALL | re.MULTILINE
+    r"(?:<!-- not run: (?P<reason>[^>]*) -->\n+)?^(?P<indent> *)```python\n(?P<code>.*?)^(?P=indent)```$",
+    re.DOTALL | re.MULTILINE,
 )
 
 
@@ -37,7 +39,8 @@ class Snippet:
 
 def snippets(page: str) -> list[Snippet]:
     text = PAGES[page].read_text(encoding="utf-8")
-    return [Snippet(m["code"], text.count("\n", 0, m.start("code")), m["reason"]) for m in _BLOCK.finditer(text)]
+    found = [(dedent(m["code"]), text.count("\n", 0, m.start("code")), m["reason"]) for m in _BLOCK.finditer(text)]
+    return [Snippet(*each) for each in found]
 
 
 def run_page(page: str, folder: Path) -> dict[str, Any]:
@@ -94,6 +97,7 @@ def _weights(folder: Path) -> None:
 
 
 PREPARED: dict[str, Callable[[Path], None]] = {
+    "CONTRIBUTING.md": _sequence("house.json"),
     "docs/blender.md": _sequence("out/chair/sequence.json"),
     "docs/comparing.md": _evaluated,
     "docs/datasets.md": data_sets,

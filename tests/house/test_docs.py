@@ -1,10 +1,16 @@
 """The pages are true: their Python runs, their links lead somewhere, their pictures are the ones that are drawn."""
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from agents.registry import AGENTS
+from autopoly_env.export.formats import FORMATS
+from autopoly_env.operators import OPERATORS
+from autopoly_env.targets.families import FAMILIES
 from docs import draw_guidance
 from tests.helpers.pages import PAGES, run_page, snippets
 
@@ -12,6 +18,18 @@ WITH_PYTHON = [page for page in PAGES if snippets(page) and page != "README.md"]
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 
 
+@pytest.fixture
+def _registries_as_they_were() -> Iterator[None]:
+    """Recipes register things; let no other test see them."""
+    registries: list[dict[str, Any]] = [AGENTS, FAMILIES, FORMATS, OPERATORS]
+    kept = [dict(registry) for registry in registries]
+    yield
+    for registry, was in zip(registries, kept, strict=True):
+        registry.clear()
+        registry.update(was)
+
+
+@pytest.mark.usefixtures("_registries_as_they_were")
 @pytest.mark.parametrize("page", WITH_PYTHON)
 def test_python__runs_as_it_stands(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
