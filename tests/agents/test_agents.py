@@ -38,6 +38,7 @@ def test_solve__takes_a_square_for_what_it_is(name: str) -> None:
     assert solution.stats.stopped_by == "finished"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_solve__gives_the_same_twice(name: str) -> None:
     agent, game = quick(name), simulator("island")
@@ -46,6 +47,7 @@ def test_solve__gives_the_same_twice(name: str) -> None:
     assert between.sequence.to_json() != once.sequence.to_json()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_progress__never_goes_back(name: str) -> None:
     reports: list[Progress] = []
@@ -65,6 +67,7 @@ def test_budget__of_nothing_returns_the_rectangle(name: str) -> None:
         assert solution.mesh == game.polish(game.initial().mesh) and not solution.sequence.steps
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_budget__is_overrun_by_one_step_at_most(name: str) -> None:
     game = simulator("blobs")
@@ -100,6 +103,7 @@ def test_interrupt__returns_the_best_so_far(name: str, call: int) -> None:
     assert_consistent(solution, game)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["greedy", "beam"])
 def test_interrupt__loses_nothing_that_was_reported(name: str) -> None:
     game = Simulator(TARGETS["blobs"], resolution=40)  # the resolution of the silhouette: scores can be compared

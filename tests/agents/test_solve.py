@@ -68,6 +68,7 @@ def read_obj(path: str) -> tuple[np.ndarray, list[list[int]]]:
 # What is written and printed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("agent", "name"), [("trace", "mug"), ("greedy", "table")])
 def test_solve__writes_results_that_agree_with_its_record_and_with_shapely(run: Run, agent: str, name: str) -> None:
     image = EXAMPLES / f"{name}.png"
@@ -90,6 +91,7 @@ def test_solve__writes_results_that_agree_with_its_record_and_with_shapely(run: 
     assert record["r_all"] == pytest.approx(100 * record["r_sm"] - 0.5 * record["r_sc"] - 5 * record["r_si"])
 
 
+@pytest.mark.slow
 def test_solve__records_a_sequence_that_replays_to_the_mesh(run: Run) -> None:
     done = run(EXAMPLES / "mug.png", "--json", "--seed", 7, *QUICK)
     record = json.loads(done.out)
@@ -105,6 +107,7 @@ def test_solve__records_a_sequence_that_replays_to_the_mesh(run: Run) -> None:
     assert min(Image.open(record["files"]["steps.png"]).size) > 200
 
 
+@pytest.mark.slow
 def test_solve__shows_a_table_with_means_and_names_the_overview_last(run: Run) -> None:
     done = run(EXAMPLES / "bottle.png", EXAMPLES / "mug.png", "--out", "deep/results", *QUICK)
     lines = done.out.splitlines()
@@ -118,6 +121,7 @@ def test_solve__shows_a_table_with_means_and_names_the_overview_last(run: Run) -
     assert Image.open("deep/results/overview.png").width == 2 * 256
 
 
+@pytest.mark.slow
 def test_solve__of_one_image_names_its_sheet_and_writes_no_overview(run: Run) -> None:
     small_image("box.png")
     done = run("box.png")
@@ -127,6 +131,7 @@ def test_solve__of_one_image_names_its_sheet_and_writes_no_overview(run: Run) ->
     assert sorted(os.listdir("out/box")) == sorted(RESULTS)
 
 
+@pytest.mark.slow
 def test_quiet__leaves_the_table_and_the_warnings(run: Run) -> None:
     small_image("box.png")
     Image.radial_gradient("L").save("photo.png")
@@ -146,6 +151,7 @@ def test_json__prints_nothing_else_on_stdout(run: Run) -> None:
     assert done.err.splitlines() == [f"error: {records[0]['error']}", "Open out/overview.png"]
 
 
+@pytest.mark.slow
 def test_images__of_the_same_name_get_folders_of_their_own(run: Run) -> None:
     images = [small_image("a/box.png"), small_image("b/box.png", box=(4, 4, 20, 20)), small_image("box-2.png")]
     done = run(*images)
@@ -155,11 +161,13 @@ def test_images__of_the_same_name_get_folders_of_their_own(run: Run) -> None:
     assert areas == pytest.approx([32 * 48 / 64**2, (16 / 64) ** 2, 32 * 48 / 64**2], rel=0.1)
 
 
+@pytest.mark.slow
 def test_image__named_twice_is_solved_once(run: Run) -> None:
     small_image("a/box.png")
     assert len(run("a", "a/box.png", "a/*.png", "--json").out.splitlines()) == 1
 
 
+@pytest.mark.slow
 def test_results__do_not_depend_on_threads_or_on_the_images_before(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     images = [EXAMPLES / "table.png", EXAMPLES / "bottle.png"]
     options = ("--resolution", "64", "--refits", "150", "--seed", "3")
@@ -246,6 +254,7 @@ def test_out__that_cannot_be_written_is_found_out_before_the_work(run: Run, monk
     assert done.err.startswith("error: cannot write to the folder file/out")
 
 
+@pytest.mark.slow
 def test_failed_write__leaves_nothing_behind(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     small_image("box.png")
     small_image("other.png")
@@ -265,6 +274,7 @@ def test_failed_write__leaves_nothing_behind(run: Run, monkeypatch: pytest.Monke
     assert os.listdir("out") == ["box"]
 
 
+@pytest.mark.slow
 def test_stdout__that_takes_nothing_more_is_one_line(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     small_image("box.png")
 
@@ -342,6 +352,7 @@ def test_ctrl_c_in_a_search__writes_the_best_so_far_and_stops(run: Run, agent_th
     assert "stopped by Ctrl-C: 1 of 2 images left" in done.err
 
 
+@pytest.mark.slow
 def test_ctrl_c_outside_a_search__waits_until_the_image_is_written(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted_sheet(*_: object) -> Image.Image:
         press_ctrl_c()
@@ -356,6 +367,7 @@ def test_ctrl_c_outside_a_search__waits_until_the_image_is_written(run: Run, mon
     assert done.out.splitlines()[-1] == "Open out/a/steps.png"
 
 
+@pytest.mark.slow
 def test_ctrl_c_while_an_image_loads__leaves_that_image(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted_load(path: Path, name: str) -> Any:
         press_ctrl_c()
@@ -367,6 +379,7 @@ def test_ctrl_c_while_an_image_loads__leaves_that_image(run: Run, monkeypatch: p
     assert "stopped by Ctrl-C: 2 of 2 images left" in done.err
 
 
+@pytest.mark.slow
 def test_second_ctrl_c__aborts_and_leaves_nothing_half_written(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     def impatient_sheet(*_: object) -> Image.Image:
         press_ctrl_c()
@@ -381,6 +394,7 @@ def test_second_ctrl_c__aborts_and_leaves_nothing_half_written(run: Run, monkeyp
     assert signal.getsignal(signal.SIGINT) is handler
 
 
+@pytest.mark.slow
 def test_second_ctrl_c__waits_while_files_are_moved_into_place(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     def impatient_replace(source: Path, goal: Path) -> None:
         press_ctrl_c()
@@ -393,6 +407,7 @@ def test_second_ctrl_c__waits_while_files_are_moved_into_place(run: Run, monkeyp
     assert (os.listdir("out"), sorted(os.listdir("out/a"))) == (["a"], sorted(RESULTS))
 
 
+@pytest.mark.slow
 def test_ctrl_c_in_the_shell__leaves_finished_images_whole() -> None:
     for k in range(40):
         small_image(f"pictures/{k:02}.png", box=(8, 8, 20 + k, 56))

@@ -6,12 +6,14 @@ import subprocess
 import sys
 
 import gymnasium
+import pytest
 
 from autopoly_env.targets import split_seed
 from tests.helpers.environments import SMALL, begun, make, play, same
 from tests.helpers.paths import ROOT
 
 
+@pytest.mark.slow
 def test_replay_of_200_random_actions__is_the_same_bit_for_bit() -> None:
     rules = {"operators": "full", "max_steps": 250, "max_vertices": 40}
     env, other = make(**rules), make(**rules)
@@ -57,6 +59,7 @@ def test_planner__uses_the_simulator_and_leaves_the_env_alone() -> None:
     assert env.state == best
 
 
+@pytest.mark.slow
 def test_same_seed__gives_the_same_episode_in_another_process() -> None:
     code = (
         "import gymnasium\n"

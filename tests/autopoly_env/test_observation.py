@@ -3,6 +3,7 @@
 from itertools import pairwise
 
 import numpy as np
+import pytest
 
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.raster import coverage
@@ -44,6 +45,7 @@ def test_vertices_far_outside__are_clipped_into_the_space() -> None:
     assert seen["vertices"][:2].tolist() == [-1.0, 0.25]
 
 
+@pytest.mark.slow
 def test_observations__are_in_their_space_in_every_step_of_long_random_play() -> None:
     env = make(operators="full", max_steps=300, max_vertices=24, match_threshold=1.0)
     for seed in range(3):

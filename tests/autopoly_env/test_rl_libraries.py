@@ -10,6 +10,8 @@ import pytest
 from autopoly_env.wrappers import FlatObservation
 from tests.helpers.paths import ROOT
 
+pytestmark = pytest.mark.slow  # every library trains
+
 IDS = {"AutoPoly-v0": {}, "AutoPolyObjects-v0": {}, "AutoPolyFolder-v0": {"targets": str(ROOT / "examples")}}
 SMALL: dict[str, Any] = {"resolution": 16, "obs_resolution": 36, "max_vertices": 16, "reward_mode": "improvement"}
 N_STEPS = 2000

@@ -58,6 +58,7 @@ def rollout(envs: Any, n_steps: int, mode: AutoresetMode) -> list[Any]:
     return seen
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES, ids=str)
 @pytest.mark.parametrize("n_threads", [1, 2])
 def test_native__gives_what_sync_gives(mode: AutoresetMode, n_threads: int) -> None:
@@ -71,6 +72,7 @@ def test_native__gives_what_sync_gives(mode: AutoresetMode, n_threads: int) -> N
     assert any((step[2] | step[3]).any() for step in ours if len(step) == 5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES, ids=str)
 def test_async_with_spawned_workers__gives_what_sync_gives(mode: AutoresetMode) -> None:
     kwargs = {"context": "spawn", "autoreset_mode": mode}

@@ -58,6 +58,7 @@ def test_picture__has_the_pieces_and_holes_that_the_readme_says(picture: Path) -
     assert (n_pieces, n_holes) == readme_rows()[picture.name]
 
 
+@pytest.mark.slow
 def test_agent_in_fifteen_lines__beats_random_play(capsys: pytest.CaptureFixture[str]) -> None:
     path = ROOT / "examples" / "agent_in_fifteen_lines.py"
     tree = ast.parse(path.read_text(encoding="utf-8"))

@@ -9,6 +9,8 @@ import pytest
 from tests.helpers.pages import run_page, snippets
 from tests.helpers.paths import EXAMPLES
 
+pytestmark = pytest.mark.slow  # the page solves and plays as a reader would
+
 
 @pytest.fixture(scope="module")
 def played(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], str]:

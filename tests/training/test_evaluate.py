@@ -164,6 +164,7 @@ def test_json__prints_the_rows_and_nothing_else(run: Run) -> None:
     assert rows[0]["shapes"] == 3
 
 
+@pytest.mark.slow
 def test_results__do_not_depend_on_the_engine_or_on_who_takes_part(run: Run) -> None:
     run("tiny.yaml", "--out", "serial", "--set", "seeds=[0, 1]")
     run("tiny.yaml", "--out", "process", "--set", "seeds=[0, 1]", "--engine", "process", "--workers", 2)
@@ -231,6 +232,7 @@ def test_resume__does_what_has_no_record_and_drops_half_a_line(run: Run) -> None
     assert run("tiny.yaml", "--out", "new", "--resume", "--agents", "trace").code == 0  # nothing there to go on with
 
 
+@pytest.mark.slow
 def test_kill__at_any_moment_loses_and_repeats_nothing(run: Run) -> None:
     Path("tiny.yaml").write_text(SUITE.replace("n: 3", "n: 8"))
     assert run("tiny.yaml", "--out", "whole").code == 0
@@ -256,6 +258,7 @@ def test_kill__at_any_moment_loses_and_repeats_nothing(run: Run) -> None:
     assert table("killed") == table("whole")
 
 
+@pytest.mark.slow
 def test_ctrl_c__leaves_a_run_to_go_on_with() -> None:
     Path("tiny.yaml").write_text(SUITE.replace("n: 3", "n: 2000"))
     command = [sys.executable, "-m", "training.evaluate", "tiny.yaml", "--out", "out"]

@@ -71,6 +71,7 @@ def test_objects__have_masks_and_no_sequences(run: Run) -> None:
         assert example.mask.any()
 
 
+@pytest.mark.slow
 def test_target__depends_on_seed_and_number_alone(run: Run) -> None:
     assert run("constructions", "--n", 7, "--out", "a", "--shard-size", 3, *SERIAL).code == 0
     assert run("constructions", "--n", 5, "--out", "b", "--workers", 2, "--resolution", 64).code == 0
@@ -141,6 +142,7 @@ def test_resume__gives_the_same_bytes_and_remakes_nothing_that_is_there(
         assert Path("data", name).read_bytes() == Path("whole", name).read_bytes()
 
 
+@pytest.mark.slow
 def test_killed_run__leaves_only_whole_shards_and_goes_on(run: Run, tmp_path: Path) -> None:
     arguments = [
         "constructions",

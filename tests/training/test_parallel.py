@@ -20,6 +20,8 @@ from tests.helpers.paths import ROOT
 from training import parallel
 from training.parallel import map_tasks
 
+pytestmark = pytest.mark.slow  # processes start and are killed, Ray is loaded
+
 needs_ray = pytest.mark.skipif(find_spec("ray") is None, reason="Ray is not installed: pip install -e '.[cluster]'")
 SQUARES: list[Job] = [("square", x) for x in range(20)]
 

@@ -24,6 +24,8 @@ from training.rl_clone import CloneConfig, CloneTask, prepared, sample_of, turne
 
 torch.set_num_threads(1)  # as tests run beside each other
 
+pytestmark = pytest.mark.slow  # a network is trained
+
 
 TEACHER = SourceConfig(n_steps=3, resolution=64)
 

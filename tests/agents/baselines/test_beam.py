@@ -22,6 +22,7 @@ def test_greedy__is_a_beam_of_width_one(target: str) -> None:
     assert greedy.sequence == beam.sequence and greedy.stats.n_refits == beam.stats.n_refits
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize("name", ["greedy", "beam"])
 def test_search__is_never_worse_than_the_rectangle_it_begins_with(name: str, target: str) -> None:

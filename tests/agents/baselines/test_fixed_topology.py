@@ -79,6 +79,7 @@ def torch() -> Any:
     return pytest.importorskip("torch")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["dr-simple", "dr-complex"])
 def test_gradient__moves_the_vertices_only_and_counts_as_one_refit(name: str, torch: Any) -> None:
     game = simulator("blobs")
@@ -89,6 +90,7 @@ def test_gradient__moves_the_vertices_only_and_counts_as_one_refit(name: str, to
     assert not solution.sequence.steps and sum(defects_of(solution.mesh)) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["dr-simple", "dr-complex"])
 def test_gradient__finds_a_quadrilateral_inside_its_box(name: str, torch: Any) -> None:
     game = Simulator(painted(TRAPEZIUM), resolution=64)
@@ -97,6 +99,7 @@ def test_gradient__finds_a_quadrilateral_inside_its_box(name: str, torch: Any) -
     assert far.score.iou < 0.8 and near.score.iou > 0.97
 
 
+@pytest.mark.slow
 def test_gradient__takes_the_best_on_the_way(torch: Any) -> None:
     game, agent = simulator("house"), make_agent("dr-simple", refit="gradient", iterations=3, learning_rate=0.9)
     box = agent.solve(Simulator(painted(SQUARE), resolution=32)).mesh
@@ -104,6 +107,7 @@ def test_gradient__takes_the_best_on_the_way(torch: Any) -> None:
     assert agent.solve(game).score.iou >= 0.75
 
 
+@pytest.mark.slow
 def test_gradient__is_no_match_for_least_squares(torch: Any) -> None:
     games = [Simulator(silhouette, resolution=48) for silhouette in (noise(1), noise(2), noise(3), painted(L_SHAPE))]
     for name in ("dr-simple", "dr-complex"):
@@ -112,6 +116,7 @@ def test_gradient__is_no_match_for_least_squares(torch: Any) -> None:
         assert np.mean(plain) <= np.mean(fitted)
 
 
+@pytest.mark.slow
 def test_gradient__crosses_itself_only_where_it_may(torch: Any) -> None:
     defects = {False: 0, True: 0}
     for silhouette in (noise(1), noise(3), painted(TWO_SQUARES)):

@@ -98,6 +98,7 @@ def test_oracle__goes_no_deeper_than_it_is_told() -> None:
     assert len(make_agent("oracle", width=2, depth=2).solve(simulator("blobs")).sequence.steps) <= 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("target", ["house", "frame", "two squares"])
 def test_oracle__is_never_below_greedy_and_a_beam(target: str) -> None:
     game = Simulator(TARGETS[target], resolution=16, operators="paper", max_steps=6)

@@ -125,6 +125,7 @@ def hopped(seed: int, patience: int = 15, budget: Budget | None = None) -> list[
     return [place.total for place in found]
 
 
+@pytest.mark.slow
 def test_hop__finds_better_tops_and_the_same_ones_for_a_seed() -> None:
     first = hopped(0)
     assert max(first) > 65.0  # the box that it begins with is worth 28.7

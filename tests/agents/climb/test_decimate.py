@@ -61,6 +61,7 @@ def test_decimate__finds_simple_shapes_perfectly(shape: object, n_elements: tupl
     assert (solution.mesh.counts, round(solution.score.iou, 6)) == (n_elements, 1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("operators", ["full", "paper"])
 @pytest.mark.parametrize("target", TARGETS)
 def test_solve__returns_what_its_sequence_builds(target: str, operators: str) -> None:
@@ -68,6 +69,7 @@ def test_solve__returns_what_its_sequence_builds(target: str, operators: str) ->
     assert_consistent(make_agent("decimate").solve(game), game)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("w_sc", [0.1, 1.0])
 @pytest.mark.parametrize("n", [4, 7, 12])
 def test_max_vertices__is_kept_at_any_price(n: int, w_sc: float) -> None:
@@ -77,6 +79,7 @@ def test_max_vertices__is_kept_at_any_price(n: int, w_sc: float) -> None:
     assert len(solution.mesh.vertices) <= n
 
 
+@pytest.mark.slow
 def test_max_vertices__buys_more_where_vertices_are_cheap() -> None:
     game = simulator("blobs", weights=ScoreWeights(w_sc=0.1))
     totals = [make_agent("decimate", max_vertices=n).solve(game).score.total for n in (4, 8, None)]
@@ -94,6 +97,7 @@ def test_decimate__keeps_to_the_step_limit() -> None:
         assert_consistent(make_agent("decimate").solve(game), game)
 
 
+@pytest.mark.slow
 def test_budget__is_overrun_by_one_step_at_most() -> None:
     game = simulator("blobs")
     for refits in (0, 1, 5, 30):
@@ -105,6 +109,7 @@ def test_budget__is_overrun_by_one_step_at_most() -> None:
     assert make_agent("decimate").solve(game, Budget(refits=0)).mesh == game.polish(game.initial().mesh)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("call", [1, 2, 4])
 def test_interrupt__returns_the_best_so_far(call: int) -> None:
     game = simulator("blobs")

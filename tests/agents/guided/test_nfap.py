@@ -176,6 +176,7 @@ def test_choice__reads_its_own_operators_region_and_the_residual() -> None:
     assert (logits[1] - logits[0]).item() == pytest.approx(1.0 - 0.25)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("config", [PAPER, RICH, replace(RICH, judge=True)], ids=["paper", "rich", "judge"])
 def test_net__learns_one_batch(config: NfapConfig) -> None:
     stream = NfapStream(Live(SourceConfig(source="simulator", difficulty=(2, 3))), config, LabelConfig(), seed=0)
@@ -326,6 +327,7 @@ def test_warp_expand__needs_no_refit_and_is_never_worse_than_the_bare_action(pla
 # --- agents ---
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["nfap-prior", "nfap-mcts"])
 def test_agent__plays(name: str, weights: dict[str, str]) -> None:
     options: dict[str, Any] = {"nfap_weights": weights["nfap"], "n": 2, "n_simulations": 4}
@@ -338,6 +340,7 @@ def test_agent__plays(name: str, weights: dict[str, str]) -> None:
     assert first.sequence.final() == first.mesh
 
 
+@pytest.mark.slow
 def test_mcts_with_networks__refits_only_what_it_commits(weights: dict[str, str]) -> None:
     agent = make_agent(
         "nfap-mcts", nfap_weights=weights["nfap"], warpnet_weights=weights["warpnet"], n=2, n_simulations=8
@@ -371,6 +374,7 @@ def test_algorithm_1__has_no_seeds() -> None:
         make_agent("nfap-mcts", seeds=["climb"])
 
 
+@pytest.mark.slow
 def test_registry__does_not_import_torch() -> None:
     command = [sys.executable, "-c", "import sys, agents.registry; sys.exit('torch' in sys.modules)"]
     assert subprocess.run(command, cwd=ROOT, check=False).returncode == 0

@@ -171,6 +171,7 @@ def test_net__untrained_leaves_everything_where_it_is(config: WarpConfig) -> Non
     assert loss_terms(net, warps)["mesh"].item() == pytest.approx(start, rel=1e-3)
 
 
+@pytest.mark.slow
 @NETS
 def test_net__learns_one_batch(config: WarpConfig) -> None:
     torch.manual_seed(0)

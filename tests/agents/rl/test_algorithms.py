@@ -15,6 +15,8 @@ from tests.helpers.policies import ALGORITHMS, config, table
 
 torch.set_num_threads(1)  # as tests run beside each other
 
+pytestmark = pytest.mark.slow  # every algorithm plays
+
 
 @pytest.mark.parametrize("name", ALGORITHMS)
 def test_algorithm__never_takes_an_illegal_action(name: str) -> None:

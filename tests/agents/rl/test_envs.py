@@ -46,6 +46,7 @@ def test_native_environments__do_what_each_does_alone() -> None:
     assert isinstance(many, NativeVecEnv) and many.seconds > 0.0
 
 
+@pytest.mark.slow
 def test_processes__do_the_same_as_one() -> None:
     courses = [Course(difficulty=(1, 2))]
     native = make_vec_env(table(), courses, 2, "native", seed=1)

@@ -97,6 +97,7 @@ def test_renumbering__permutes_the_logits_and_leaves_the_value(seed: int) -> Non
     assert legal.std() > 0.1  # there is something to permute
 
 
+@pytest.mark.slow
 def test_batch__says_of_each_mesh_what_it_says_of_it_alone() -> None:
     small, large = PolyMesh.rectangle(0.2, 0.3, 0.6, 0.7), PolyMesh.grid(2, 0.1, 0.1, 0.9, 0.8)
     net = network()

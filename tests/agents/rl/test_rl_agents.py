@@ -50,6 +50,7 @@ def weights(tmp_path_factory: pytest.TempPathFactory) -> str:
 # --- what they choose ---
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_ranked__are_the_legal_actions_and_no_others(seed: int) -> None:
     player, simulator = Player(policy(seed)), game()
@@ -69,6 +70,7 @@ def test_ranked__are_the_legal_actions_and_no_others(seed: int) -> None:
         state = made[0]
 
 
+@pytest.mark.slow
 def test_sampling__draws_by_the_probabilities() -> None:
     player, simulator = Player(policy()), game()
     state = simulator.initial()
@@ -88,6 +90,7 @@ def test_guidance__is_heeded(weights: str) -> None:
     assert [moved[k] for k in range(4)] == [tuple(point) for point in start.vertices]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_agent__plays_what_the_policy_says(name: str, weights: str) -> None:
     agent, simulator = make_agent(name, weights=weights), game()
@@ -102,6 +105,7 @@ def test_agent__plays_what_the_policy_says(name: str, weights: str) -> None:
     assert solution.sequence.final() == solution.mesh
 
 
+@pytest.mark.slow
 def test_more_plays__are_no_worse_and_keep_to_the_budget(weights: str) -> None:
     one = make_agent("maskable-ppo", weights=weights).solve(game())
     eight = make_agent("maskable-ppo", weights=weights, k=8).solve(game())
@@ -110,6 +114,7 @@ def test_more_plays__are_no_worse_and_keep_to_the_budget(weights: str) -> None:
     assert short.stats.n_refits < 20 and short.stats.stopped_by == "refits"
 
 
+@pytest.mark.slow
 def test_seed__decides_what_is_sampled(weights: str) -> None:
     def steps(seed: int) -> Any:
         return make_agent("ppo", weights=weights, play="sampled", seed=seed).solve(game()).sequence
@@ -221,6 +226,7 @@ def test_agents__are_in_the_registry_with_the_same_options() -> None:
 # --- through the evaluation ---
 
 
+@pytest.mark.slow
 def test_evaluate__measures_them_beside_the_others(
     weights: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

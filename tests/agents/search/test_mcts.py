@@ -26,6 +26,7 @@ def quick(name: str, **options: Any) -> Agent:
     return make_agent(name, **({"seeds": (), **few} if name == "mcts" else {**few, "n_rollout": 1}))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize("name", ["mcts", "mcts_paper"])
 def test_solve__returns_what_its_sequence_builds(name: str, target: str) -> None:
@@ -43,6 +44,7 @@ def test_solve__keeps_to_the_step_limit(name: str) -> None:
         assert_consistent(quick(name).solve(game), game)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "options"), [("mcts", {"seeds": ()}), ("mcts", {}), ("mcts_paper", {})])
 def test_solve__is_the_same_for_a_seed_at_a_budget(name: str, options: dict[str, Any]) -> None:
     game, budget = simulator("island"), Budget(refits=150)
@@ -67,6 +69,7 @@ def test_budget__of_nothing_returns_the_rectangle(name: str) -> None:
         assert solution.mesh == game.polish(game.initial().mesh) and not solution.sequence.steps
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [{"seeds": ()}, {}])
 def test_budget__is_overrun_by_one_step_at_most(options: dict[str, Any]) -> None:
     game = simulator("blobs")
@@ -81,6 +84,7 @@ def test_budget__is_overrun_by_one_step_at_most(options: dict[str, Any]) -> None
         assert totals == sorted(totals)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("call", [1, 2, 4, 12])
 @pytest.mark.parametrize("options", [{"seeds": ()}, {"seeds": ("greedy",)}, {}])
 def test_interrupt__returns_the_best_so_far(options: dict[str, Any], call: int) -> None:
@@ -116,6 +120,7 @@ def test_act__takes_what_leads_on_and_stops_where_nothing_is_better() -> None:
 # --- incumbents ---
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("target", TARGETS)
 def test_seeds__are_never_lost(target: str) -> None:
     game = simulator(target)
@@ -126,6 +131,7 @@ def test_seeds__are_never_lost(target: str) -> None:
     assert solution.score.total >= max(incumbent.score.total for incumbent in incumbents)
 
 
+@pytest.mark.slow
 def test_seeds__do_not_keep_the_search_from_the_rectangle() -> None:
     game = simulator("blobs")
     pure, both = (make_agent("mcts", seeds=seeds, hop_patience=0).solve(game) for seeds in ((), ("trace",)))
@@ -164,6 +170,7 @@ def test_seeds__that_cannot_take_guidance_are_left_out() -> None:
     assert_consistent(solution, game)
 
 
+@pytest.mark.slow
 def test_hop_patience__finds_what_the_tree_does_not() -> None:
     game = simulator("blobs")
     alone, hopping = (
@@ -178,6 +185,7 @@ def test_n_refits__limits_a_search_without_a_budget() -> None:
     assert 100 <= solution.stats.n_refits < 150 and solution.stats.stopped_by == "refits"
 
 
+@pytest.mark.slow
 def test_simulations__limit_a_search() -> None:
     game, seen = simulator("blobs"), []
     solution = make_agent("mcts", seeds=()).solve(game, Budget(simulations=3), seen.append)

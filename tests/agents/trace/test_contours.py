@@ -39,6 +39,7 @@ def test_rings__of_an_island_in_a_hole_are_outer_ones_again() -> None:
     assert [signed_area(ring.points) > 0.0 for ring in rings] == [True, True, False, False]
 
 
+@pytest.mark.slow
 @given(st.integers(0, 999), st.integers(1, 64))
 def test_rings__part_the_pixels_of_the_object_from_all_others(seed: int, resolution: int) -> None:
     silhouette = noise(seed, resolution)
@@ -59,6 +60,7 @@ def test_rings__part_the_pixels_of_the_object_from_all_others(seed: int, resolut
     assert areas == [*sorted(areas[:parts], reverse=True), *sorted(areas[parts:])]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("resolution", [300, 384, 512])
 def test_rings__never_touch_where_pixels_are_covered_by_half(resolution: int) -> None:
     """Above 256 pixels the contours run on area averages, of which many are exactly a half."""
@@ -128,6 +130,7 @@ def area_between(points: FloatArray) -> float:
     return area
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("n", [4, 6, 9])
 def test_polygons__err_as_little_as_the_best_of_all_subsets(seed: int, n: int) -> None:

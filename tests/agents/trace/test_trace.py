@@ -135,12 +135,14 @@ ODD_MASKS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("operators", ["full", "paper"])
 @pytest.mark.parametrize("mask", ODD_MASKS.values(), ids=ODD_MASKS)
 def test_trace__builds_something_sane_of_odd_pictures(mask: npt.NDArray[np.bool_], operators: str) -> None:
     solved(Simulator(Silhouette(mask), resolution=32, operators=operators))
 
 
+@pytest.mark.slow
 @given(
     st.integers(0, 999),
     st.integers(2, 72),

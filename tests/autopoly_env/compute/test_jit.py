@@ -10,6 +10,8 @@ import pytest
 
 from autopoly_env.compute import jit
 
+pytestmark = pytest.mark.slow  # kernels are compiled from nothing
+
 PACKAGE = Path(jit.__file__).parent.parent
 INNER = "from autopoly_env.compute.jit import kernel\n\n@kernel\ndef factor() -> float:\n    return {factor}\n"
 OUTER = (

@@ -69,6 +69,7 @@ def test_drawing__has_no_style_sheet_that_would_reach_other_drawings() -> None:
     assert not list(ET.fromstring(to_svg(QUAD)).iter(f"{SVG}style"))
 
 
+@pytest.mark.slow
 def test_core__loads_the_writers_only_when_they_are_asked_for() -> None:
     code = (
         "import sys; from autopoly_env import mesh, sequence; quad = mesh.PolyMesh.rectangle(0, 0, 1, 1);"

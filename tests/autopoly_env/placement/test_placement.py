@@ -192,6 +192,7 @@ def test_starts__refuse_an_element_that_does_not_exist(operator: str) -> None:
             starts(disagreement, Action(operator, element))
 
 
+@pytest.mark.slow
 @given(meshes(), st.integers(0, 99))
 def test_starts__are_no_worse_than_the_mesh_or_else_the_operators_own(mesh: PolyMesh, seed: int) -> None:
     """Crossings and flipped faces; the last start is the operator's own unless it cuts a hole."""

@@ -245,6 +245,7 @@ def test_loss__of_a_perfect_fit_is_zero() -> None:
         np.testing.assert_allclose(gradient, 0.0, atol=1e-10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("offset", [(0.0, 0.0), (0.31, 0.0), (-0.33, 0.29), (0.03, 0.41)])
 @pytest.mark.parametrize("resolution", [1, 4])
 def test_gradient__equals_differences_of_exact_images(offset: tuple[float, float], resolution: int) -> None:

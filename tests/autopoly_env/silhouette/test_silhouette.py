@@ -322,6 +322,7 @@ def test_load__names_a_silhouette_after_its_file_unless_told(tmp_path: Path) -> 
 # --- large pictures ---
 
 
+@pytest.mark.slow
 def test_load__averages_blocks_of_a_picture_over_2048_pixels() -> None:
     mask = np.zeros((4100, 4099), dtype=bool)
     mask[300:3000, 600:1500] = True
@@ -370,6 +371,7 @@ print(silhouette.resolution, silhouette.mask.mean(), peak * 1024)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="peak memory is read from /proc")
 def test_load__reads_twenty_thousand_pixels_a_side_in_strips_within_a_gigabyte(tmp_path: Path) -> None:
     path = tmp_path / "huge.png"

@@ -97,6 +97,7 @@ def soups(draw: st.DrawFn) -> tuple[np.ndarray, list[list[int]]]:
     return rng.normal(size=(n, 3)), triangles + triangles[:2]
 
 
+@pytest.mark.slow
 @given(soups())
 @settings(max_examples=60)
 def test_paint_polygons__sets_the_samples_that_lie_in_any_triangle(soup: tuple[np.ndarray, list[list[int]]]) -> None:

@@ -64,6 +64,7 @@ def test_seed__gives_the_picture_that_it_always_gave(name: str, seed: int) -> No
     assert digest(make_targets(name).sample(seed)) == PICTURES[name, seed]
 
 
+@pytest.mark.slow
 def test_seed__gives_the_same_picture_in_another_process() -> None:
     seeds = [split_seed("test", i) for i in range(20)]
     program = (
@@ -135,6 +136,7 @@ def outline(mesh: PolyMesh) -> tuple[int, ...]:
     return tuple(sorted(map(len, mesh.topology.boundary_loops)))
 
 
+@pytest.mark.slow
 def test_sequence__starts_at_a_rectangle_and_replays_to_the_silhouette(built: Built) -> None:
     for source, silhouette, sequence in built:
         assert sequence.start.counts == (4, 4, 1)
@@ -143,6 +145,7 @@ def test_sequence__starts_at_a_rectangle_and_replays_to_the_silhouette(built: Bu
         assert np.array_equal(coverage(again.final(), source.resolution) >= 0.5, silhouette.mask)
 
 
+@pytest.mark.slow
 def test_sequence__keeps_the_score_of_every_mesh(built: Built) -> None:
     for _, silhouette, sequence in built:
         assert sequence.settings["target"] == silhouette.name
@@ -152,6 +155,7 @@ def test_sequence__keeps_the_score_of_every_mesh(built: Built) -> None:
         assert last["total"] == 100.0 - sum(sequence.final().counts)  # the paper's weights for synthetic shapes
 
 
+@pytest.mark.slow
 def test_difficulty__is_how_often_the_outline_changes(built: Built) -> None:
     for source, _, sequence in built:
         operators = [step.operator for step in sequence.steps]
@@ -163,6 +167,7 @@ def test_difficulty__is_how_often_the_outline_changes(built: Built) -> None:
             before.append(outline(mesh))
 
 
+@pytest.mark.slow
 def test_face_split__is_always_followed_by_the_deletion_of_a_part(built: Built) -> None:
     splits = 0
     for _, _, sequence in built:
@@ -184,6 +189,7 @@ def test_difficulty_range__is_drawn_evenly() -> None:
     assert min(np.bincount(n_changes, minlength=4)[1:]) > 35
 
 
+@pytest.mark.slow
 def test_every_mesh__is_valid_and_lies_in_the_picture_without_crossing_overlap_or_flip(built: Built) -> None:
     for _, _, sequence in built:
         for mesh in sequence.meshes():
@@ -193,6 +199,7 @@ def test_every_mesh__is_valid_and_lies_in_the_picture_without_crossing_overlap_o
             assert 0.0 < mesh.vertices.min() and mesh.vertices.max() < 1.0
 
 
+@pytest.mark.slow
 def test_shape__is_centred_and_covers_a_fair_share_of_the_picture(built: Built) -> None:
     for _, silhouette, sequence in built:
         assert 0.08 <= silhouette.mask.mean() <= 0.6
@@ -201,6 +208,7 @@ def test_shape__is_centred_and_covers_a_fair_share_of_the_picture(built: Built) 
         assert 0.59 < (high - low).max() < 0.89
 
 
+@pytest.mark.slow
 def test_shape__survives_erosion_and_a_small_picture(built: Built) -> None:
     for _, _, sequence in built:
         mesh = sequence.final()
@@ -212,6 +220,7 @@ def test_shape__survives_erosion_and_a_small_picture(built: Built) -> None:
         assert thinner.area > 0.85 * faces.area
 
 
+@pytest.mark.slow
 def test_operators__are_the_ones_asked_for() -> None:
     used = {"paper": set[str](), "full": set[str](), "edge_extrude,edge_dissolve": set[str]()}
     for operators, names in used.items():
@@ -250,6 +259,7 @@ def things() -> dict[str, list[np.ndarray]]:
     return {name: [source.sample(seed).mask for seed in range(N_THINGS)] for name, source in THINGS.items()}
 
 
+@pytest.mark.slow
 def test_there_are__many_families_and_a_source_of_all_draws_every_one() -> None:
     assert len(FAMILIES) >= 16
     source = ObjectTargets(resolution=64)
@@ -292,11 +302,13 @@ WHOLE += ["fence", "signpost", "anchor", "padlock", "ladder", "key", "wrench", "
 WHOLE += ["umbrella", "screwdriver", "guitar", "aeroplane"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", WHOLE)
 def test_family__is_in_one_piece(things: dict[str, list[np.ndarray]], family: str) -> None:
     assert {parts_and_holes(mask)[0] for mask in things[family]} == {1}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", ["mug", "boat", "rocket", "brush", "cutlery", "bulb", "car", "lamp", "pot"])
 def test_family__comes_in_one_piece_and_in_several(family: str) -> None:
     n_parts = [parts_and_holes(THINGS[family].sample(seed).mask)[0] for seed in range(80)]
@@ -312,6 +324,7 @@ def test_thing__is_clear_of_the_border_and_fills_the_picture(things: dict[str, l
         assert min(rows[0], columns[0], 255 - rows[-1], 255 - columns[-1]) >= 0.04 * 256
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", FAMILIES)
 def test_things__of_a_family_differ(things: dict[str, list[np.ndarray]], family: str) -> None:
     masks = things[family]
@@ -320,6 +333,7 @@ def test_things__of_a_family_differ(things: dict[str, list[np.ndarray]], family:
     assert np.median(overlaps) < 0.85
 
 
+@pytest.mark.slow
 def test_thing__has_nothing_as_thin_as_a_pixel_but_corners(things: dict[str, list[np.ndarray]]) -> None:
     """What a 2 x 2 square cannot reach, and what a gap of that width holds, are pixels at corners."""
     for masks in things.values():
@@ -426,6 +440,7 @@ def test_wrong_setting__is_refused_in_one_line_that_says_what_is_allowed(what: s
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.slow
 def test_pictures_of_the_documentation__are_small_and_can_be_drawn_again(tmp_path: Path) -> None:
     draw_targets.main(tmp_path)
     names = [path.name for path in sorted(tmp_path.iterdir())]

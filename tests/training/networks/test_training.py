@@ -392,6 +392,7 @@ class Dull:
 RUN = RunConfig(n_workers=0, eval_every=2, patience=3, seed=17)
 
 
+@pytest.mark.slow
 def test_run__stops_early_where_the_held_out_loss_does_not_fall(tmp_path: Path) -> None:
     train(Dull(1.0), OptimConfig(n_steps=100, batch_size=2), RUN, {}, tmp_path, Place())
     measured = [line["step"] for line in lines(tmp_path) if "held_out/loss" in line]
@@ -414,6 +415,7 @@ def test_warpnet__is_trained_and_exported(shards: Path, tmp_path: Path, monkeypa
     assert "iou_warped" in card and str(meta.training["run"]["seed"]) in card
 
 
+@pytest.mark.slow
 def test_two_processes__learn_together(shards: Path, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node", "2"]
     command += ["-m", "training.train_nfap", "--out", str(tmp_path), *settings(shards, "optim.n_steps=4")]

@@ -30,6 +30,8 @@ from training.rl_clone import CloneConfig
 
 torch.set_num_threads(1)  # as tests run beside each other
 
+pytestmark = pytest.mark.slow  # policies are trained
+
 
 # --- algorithms ---
 

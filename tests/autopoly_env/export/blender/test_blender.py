@@ -292,6 +292,7 @@ def is_odd(name: str) -> bool:
     return name != "house" and int(name.split("-")[1]) % 2 == 1
 
 
+@pytest.mark.slow
 @needs_blender
 def test_blender__has_the_same_mesh_after_every_step(made: Made) -> None:
     for name, sequence in made.sequences.items():
@@ -303,6 +304,7 @@ def test_blender__has_the_same_mesh_after_every_step(made: Made) -> None:
     assert any(step.element.get("sides") == k for s in made.sequences.values() for step in s.steps for k in (3, 4))
 
 
+@pytest.mark.slow
 @needs_blender
 def test_obj_from_blender__keeps_n_gons_and_the_silhouette(made: Made) -> None:
     centres = (np.arange(RESOLUTION) + 0.5) / RESOLUTION
@@ -320,6 +322,7 @@ def test_obj_from_blender__keeps_n_gons_and_the_silhouette(made: Made) -> None:
     assert n_compared >= 4
 
 
+@pytest.mark.slow
 @needs_blender
 def test_picture_from_blender__has_our_silhouette(made: Made) -> None:
     assert made.problems["picture"] == ""
@@ -333,6 +336,7 @@ def iou(a: np.ndarray, b: np.ndarray) -> float:
     return float((a & b).sum() / (a | b).sum())
 
 
+@pytest.mark.slow
 @needs_blender
 def test_solid_from_blender__is_closed_and_has_the_volume_area_times_depth(made: Made) -> None:
     for name in filter(is_odd, made.sequences):
@@ -345,11 +349,13 @@ def test_solid_from_blender__is_closed_and_has_the_volume_area_times_depth(made:
         assert (points[:, 2].min(), points[:, 2].max()) == (-0.1, 0.0)
 
 
+@pytest.mark.slow
 @needs_blender
 def test_counts_that_do_not_hold__stop_the_script_at_their_step(made: Made) -> None:
     assert re.search(r"step 2: Blender has \(V, E, F\) = \(5, 6, 2\), expected \(5, 6, 3\)", made.problems["wrong"])
 
 
+@pytest.mark.slow
 @needs_blender
 @pytest.mark.parametrize(("kind", "first_frames"), [("frames", [1, 25, 49, 73]), ("gltf", [1, 24, 48, 72])])
 def test_time_line__shows_one_step_after_the_other(made: Made, kind: str, first_frames: list[int]) -> None:
@@ -364,6 +370,7 @@ def test_time_line__shows_one_step_after_the_other(made: Made, kind: str, first_
     assert 0.2 < unmoved[first_frames[3] + 8] < 0.8
 
 
+@pytest.mark.slow
 @needs_blender
 def test_script_alone__writes_what_it_is_asked_for_and_runs_no_text(tmp_path: Path) -> None:
     trap = tmp_path / "trap"
@@ -381,6 +388,7 @@ def test_script_alone__writes_what_it_is_asked_for_and_runs_no_text(tmp_path: Pa
     assert sorted(float(row[3]) for row in rows if row[0] == "v") == [-0.25] * 7 + [0.0] * 7
 
 
+@pytest.mark.slow
 @needs_blender
 def test_script__refuses_options_that_it_does_not_know(made: Made) -> None:
     assert [made.problems[name] for name in ("unknown", "negative")] == ["ended with 2"] * 2
