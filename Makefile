@@ -2,10 +2,11 @@
 PYTHON ?= python3
 SILHOUETTES ?=
 BIN := .venv/bin
+PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses=2
 INSTALL := $(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check bench clean
+.PHONY: help demo test quick lint format check bench clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-6s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -14,14 +15,22 @@ demo: .venv/installed-base ## build a mesh of every silhouette in examples/ and 
 	@$(BIN)/python -m agents.solve examples --out out
 	@echo "The pictures are in out/: open the one named last above."
 
-test: .venv/installed-dev ## run the tests
-	@$(BIN)/python -m pytest -n auto --maxprocesses=2
+test: .venv/installed-dev ## run the tests, all of them
+	@$(PYTEST)
 
-check: .venv/installed-dev ## lint, formatting, types, then the tests
+quick: .venv/installed-dev ## run the tests that take less than a minute together
+	@$(PYTEST) -m "not slow"
+
+lint: .venv/installed-dev ## look at style, formatting and types
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
 	@$(BIN)/mypy
-	@$(MAKE) --no-print-directory test
+
+format: .venv/installed-dev ## put right what can be put right of style and formatting
+	@$(BIN)/ruff check --fix .
+	@$(BIN)/ruff format .
+
+check: lint test ## both lint and test: what has to pass before a change goes in
 
 bench: .venv/installed-bench ## measure the speed and quality; SILHOUETTES=DIR measures on that folder too
 	@$(BIN)/python -m benchmarks.run $(if $(SILHOUETTES),--silhouettes "$(SILHOUETTES)")

@@ -15,7 +15,7 @@ from agents.registry import make_agent
 from autopoly_env.export import save_html, save_png
 from autopoly_env.silhouette import load_silhouette
 from autopoly_env.simulator import Simulator
-from tests.browser import Browser
+from tests.helpers.browser import Browser
 
 HERE = Path(__file__).parent
 SHAPE = HERE.parent / "examples" / "padlock.png"

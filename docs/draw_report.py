@@ -10,7 +10,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from tests.browser import Browser, Page
+from tests.helpers.browser import Browser, Page
 from training.compare import main as compare
 from training.evaluate import main as evaluate
 

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import settings
 
 from autopoly_env.operators import OPERATORS
+from tests.helpers.browser import Browser
 
 settings.register_profile("autopoly", deadline=None, derandomize="CI" in os.environ)
 settings.load_profile("autopoly")
@@ -27,3 +28,10 @@ def own_operators() -> Iterator[None]:
 def sb3_logs(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
     """Stable-Baselines3 makes a folder for logs that nobody asked for; let it be among the temporary ones."""
     monkeypatch.setenv("SB3_LOGDIR", str(tmp_path_factory.getbasetemp() / "sb3"))
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    """A real one, for tests that are marked `needs_browser`."""
+    with Browser() as running:
+        yield running

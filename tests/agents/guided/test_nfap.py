@@ -1,0 +1,454 @@
+"""nFAP-Net, its weights, and the agents that are guided by it; weights are random ones made here, and quickly."""
+
+import hashlib
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+import torch
+
+from agents.budget import Budget
+from agents.guided.config import CLASSES, NfapConfig, WarpConfig, class_of
+from agents.guided.evaluator import NfapEvaluator, WarpEvaluator
+from agents.guided.measures import N_MEASURES, action_measures, action_spots
+from agents.guided.nfap import NfapLabels, NfapNet, candidates_of, loss_terms
+from agents.guided.pictures import draw_inputs
+from agents.guided.regions import N_POINTS, action_points, region_image
+from agents.guided.warp import WarpNet
+from agents.guided.weights import SHIPPED, NetworkMeta, load_nfap, load_warpnet, save_weights
+from agents.registry import make_agent
+from agents.search.evaluator import ResidualEvaluator
+from autopoly_env.errors import ConfigError
+from autopoly_env.mesh import PolyMesh
+from autopoly_env.operators import OPERATORS, PRESETS, STOP, Action, legal_actions
+from autopoly_env.placement import Disagreement
+from autopoly_env.raster import coverage
+from autopoly_env.score import ScoreWeights
+from autopoly_env.simulator import Simulator
+from tests.helpers.drawings import BOTTLE, FRAME, HOUSE, painted
+from tests.helpers.paths import ROOT
+from training.networks.labelling import SourceConfig
+from training.networks.samples import LabelConfig
+from training.networks.streams import Live, NfapStream, collate
+
+torch.set_num_threads(1)  # as tests run beside each other
+
+FULL = [operator.name for operator in PRESETS["full"]]
+MESH = PolyMesh.grid(2, 0.2, 0.2, 0.8, 0.8)
+PAPER = NfapConfig(n=2, image_size=32, feature=16, widths=(4, 4, 8, 8))
+RICH = replace(PAPER, inputs=("current", "target", "edges", "vertices"), skips=True, regions="each", residual=True)
+
+
+def make_net(config: NfapConfig = RICH, seed: int = 0) -> NfapNet:
+    torch.manual_seed(seed)
+    return NfapNet(config).eval()
+
+
+def meta_of(training: dict[str, Any]) -> NetworkMeta:
+    return NetworkMeta(kind="nfap", config={}, shapes={}, sha256="", training=training, metrics={})
+
+
+def make_evaluator(net: NfapNet | None = None, temperature: float = 0.5) -> NfapEvaluator:
+    labels = {"labels": {"w_sc": 0.3, "temperature": temperature}}
+    return NfapEvaluator(net or make_net(), meta_of(labels))
+
+
+@pytest.fixture
+def weights(tmp_path: Path) -> dict[str, str]:
+    """Files of random weights of both networks."""
+    warp = WarpNet(WarpConfig(image_size=32, grid=4, feature=16, widths=(4, 4, 8, 8)))
+    labels = {"labels": {"w_sc": 0.3, "temperature": 0.5}}
+    return {
+        "nfap": str(save_weights(tmp_path / "a.safetensors", make_net(), labels, {})),
+        "warpnet": str(save_weights(tmp_path / "b.safetensors", warp, {}, {})),
+    }
+
+
+# --- regions ---
+
+
+def test_classes__tell_stopping_and_every_operator_apart() -> None:
+    assert CLASSES[0] == "stop" and class_of(STOP) == 0
+    found = {CLASSES[class_of(action)] for action in legal_actions(MESH, FULL)}
+    assert found | {"stop"} == {*CLASSES}
+    assert CLASSES[class_of(Action("face_hole", 5))] == "face_hole_4"
+
+
+def test_action_points__lie_on_the_element() -> None:
+    actions = [
+        Action("edge_subdivide", 0),
+        Action("vertex_dissolve", 2),
+        Action("face_delete", 3),
+        Action("face_split", 0),
+    ]
+    edge, vertex, face, corner = action_points(MESH, actions)
+    (ax, ay), (bx, by) = MESH.vertices[MESH.edges[0]]
+    assert np.allclose((edge - (ax, ay)) @ np.array([by - ay, ax - bx]), 0.0)
+    assert (vertex == MESH.vertices[2]).all()
+    assert (0.5 < face).all() and (face < 0.8).all()
+    first = MESH.vertices[list(MESH.faces[0])]
+    assert (first.min(axis=0) < corner).all() and (corner < first.max(axis=0)).all()
+    assert action_points(MESH, [Action("face_hole", 6)])[0] == pytest.approx(face)
+
+
+def test_region__of_a_face_is_its_coverage() -> None:
+    expected = coverage(PolyMesh.rectangle(0.5, 0.5, 0.8, 0.8), 32)
+    assert np.allclose(region_image(MESH, Action("face_delete", 3), 32), expected, atol=1e-6)
+    assert np.allclose(region_image(MESH, Action("face_hole", 7), 32), expected, atol=1e-6)
+
+
+def test_region__of_an_edge_falls_off_with_the_distance() -> None:
+    mesh = PolyMesh.rectangle(0.25, 0.25, 0.75, 0.75)
+    top = mesh.edge_index(0, 1)
+    picture = region_image(mesh, Action("edge_extrude", top), 64)
+    assert picture[:, 32].argmax() in (15, 16) and picture.max() > 0.95
+    assert picture[32, 32] < 1e-6 and picture[16, 4] < 1e-6
+
+
+def test_region__of_stopping_is_nowhere() -> None:
+    assert not region_image(MESH, STOP, 16).any()
+
+
+@pytest.mark.parametrize("action", legal_actions(MESH, FULL), ids=str)
+def test_region__is_where_the_points_are(action: Action) -> None:
+    columns, rows = np.floor(64 * action_points(MESH, [action])[0]).astype(int).T
+    assert (region_image(MESH, action, 64)[rows, columns] > 0.6).all()
+
+
+def test_inputs__are_drawn_in_the_order_asked_for() -> None:
+    target = np.zeros((16, 16))
+    target[:8] = 1.0
+    mesh = PolyMesh.rectangle(0.0, 0.0, 0.5, 1.0)
+    drawn = draw_inputs(mesh, target, ("difference", "edges", "vertices", "target", "current"))
+    assert drawn.dtype == np.float32 and drawn.shape == (5, 16, 16)
+    assert drawn[3].tolist() == target.tolist() and drawn[4, :, :8].all() and not drawn[4, :, 8:].any()
+    assert (drawn[0] == drawn[3] - drawn[4]).all()
+    assert drawn[1, :, 8].all() and drawn[1, 0, :9].all() and not drawn[1, 3:13, 3].any()
+    assert drawn[2].sum() == 2 and drawn[2, 0, 0] == drawn[2, 0, 8] == 1.0  # the others lie below the last row
+
+
+# --- the network ---
+
+
+@pytest.mark.parametrize("config", [PAPER, RICH], ids=["paper", "rich"])
+def test_net__foresees_n_stages(config: NfapConfig) -> None:
+    said = make_net(config)(torch.rand(3, len(config.inputs), 32, 32))
+    n_regions = 1 if config.regions == "one" else len(CLASSES)
+    assert said.operators.shape == (3, 2, len(CLASSES))
+    assert said.regions.shape == (3, 2, n_regions, 32, 32)
+    assert said.images is not None and said.images.shape == (3, 2, 32, 32)
+
+
+def test_net__says_the_same_of_stage_one_without_the_others() -> None:
+    net, pictures = make_net(), torch.rand(2, 4, 32, 32)
+    alone, all_of_it = net(pictures, n_stages=1, with_images=False), net(pictures)
+    assert alone.images is None and alone.operators.shape[1] == 1
+    assert torch.equal(alone.regions[:, 0], all_of_it.regions[:, 0])
+
+
+def test_choice__is_the_operators_share_and_what_the_region_shows() -> None:
+    net = make_net(PAPER)
+    with torch.no_grad():
+        net.region_weight.fill_(2.0)
+    operators = torch.zeros(1, len(CLASSES))
+    operators[0, 1] = np.log(3.0)  # subdivision: 3 of 3 + K - 1
+    regions = torch.zeros(1, 1, 32, 32)
+    regions[:, :, :, 16:] = 1.0  # the right half, in log-odds
+    points = torch.tensor([[[0.2, 0.5]], [[0.8, 0.5]], [[0.8, 0.5]], [[0.0, 0.0]]])[None]
+    classes = torch.tensor([[1, 1, 2, -1]])
+    logits = net.choice_logits(operators, regions, points, classes, torch.zeros(1, 4))[0]
+    share = np.log([3 / 2, 3 / 2, 1.0]) - np.log(len(CLASSES) + 2)
+    assert logits[:3].tolist() == pytest.approx((share + [0.0, 2.0, 2.0]).tolist(), abs=1e-5)
+    assert logits[3] == -torch.inf
+
+
+def test_choice__reads_its_own_operators_region_and_the_residual() -> None:
+    net = make_net(RICH)
+    regions = torch.zeros(1, len(CLASSES), 32, 32)
+    regions[:, 2] = 1.0
+    points, classes = torch.full((1, 2, 1, 2), 0.5), torch.tensor([[1, 2]])
+    logits = net.choice_logits(torch.zeros(1, len(CLASSES)), regions, points, classes, torch.tensor([[0.0, -0.25]]))[0]
+    assert (logits[1] - logits[0]).item() == pytest.approx(1.0 - 0.25)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("config", [PAPER, RICH, replace(RICH, judge=True)], ids=["paper", "rich", "judge"])
+def test_net__learns_one_batch(config: NfapConfig) -> None:
+    stream = NfapStream(Live(SourceConfig(source="simulator", difficulty=(2, 3))), config, LabelConfig(), seed=0)
+    batch = collate([stream[i] for i in range(8)])
+    net = make_net(config).train()
+    optimizer = torch.optim.Adam(net.parameters(), lr=2e-2)
+    truth = NfapLabels.of(batch)
+    losses = []
+    for _ in range(25):
+        terms = loss_terms(net, net(batch["pictures"]), truth)
+        losses.append({name: term.item() for name, term in terms.items()})
+        optimizer.zero_grad()
+        torch.stack(list(terms.values())).sum().backward()
+        optimizer.step()
+    assert all(losses[-1][name] < 0.8 * losses[0][name] for name in ("image", "operator", "choice"))
+
+
+# --- measures ---
+
+
+def test_action_measures__are_those_of_the_edge_to_blame() -> None:
+    mesh = PolyMesh.rectangle(0.25, 0.25, 0.75, 0.75)
+    target = painted(shapely.box(0.25, 0.25, 1.0, 0.75))  # wider
+    actions = [Action("edge_subdivide", k) for k in range(4)]
+    measures = action_measures(Disagreement(mesh, target), actions)
+    right = mesh.edge_index(1, 2)
+    assert measures.shape == (4, N_MEASURES)
+    assert measures[:, 0] == pytest.approx(0.5)  # lengths
+    assert measures[right, 1] == pytest.approx(np.sqrt(0.25 * 0.5), rel=0.05)  # missing
+    assert measures[right, 2] == pytest.approx(0.25, abs=0.02)  # its depth
+    assert np.delete(measures, right, axis=0)[:, 1:5].max() == 0.0
+    assert measures[:, 7] == pytest.approx(measures[right, 1])  # of all edges in sum
+
+
+def test_action_measures__a_vertex_spans_more_the_more_it_bulges() -> None:
+    mesh = PolyMesh.from_faces([(0.2, 0.2), (0.5, 0.1), (0.8, 0.2), (0.8, 0.8), (0.5, 0.6), (0.2, 0.8)], [range(6)])
+    actions = [Action("vertex_dissolve", k) for k in range(6)]
+    spanned = action_measures(Disagreement(mesh, painted(HOUSE)), actions)[:, 5]
+    assert spanned[1] == pytest.approx(np.sqrt(0.5 * 0.6 * 0.1))
+    assert spanned[4] == pytest.approx(-np.sqrt(0.5 * 0.6 * 0.2))  # it dents
+    spots = action_spots(mesh, actions, action_points(mesh, actions))
+    assert spots[1, :, 1] == pytest.approx(0.2) and spots[1, :, 0].mean() == pytest.approx(0.5)
+
+
+def test_judge__begins_as_no_correction_and_does_not_mind_how_edges_are_numbered() -> None:
+    config = replace(RICH, judge=True)
+    net = make_net(config)
+    stream = NfapStream(Live(SourceConfig(source="simulator", difficulty=(2, 3))), config, LabelConfig(), seed=0)
+    batch = collate([stream[0]])
+    said, candidates = net(batch["pictures"]), candidates_of(batch)
+    without = net.choice_logits(
+        said.operators[:, 0], said.regions[:, 0], candidates.points, candidates.classes, candidates.log_residual
+    )
+    assert torch.equal(net.choose(said, candidates), without)
+    assert net.judge is not None
+    torch.nn.init.normal_(net.judge.last.weight)
+    there, back = candidates, replace(candidates, spots=candidates.spots.flip(2))
+    assert not torch.allclose(net.choose(said, there), without)
+    assert torch.allclose(net.choose(said, there), net.choose(said, back), atol=1e-5)
+
+
+# --- evaluators ---
+
+
+def game(shape: Any = HOUSE, **options: Any) -> Simulator:
+    return Simulator(painted(shape), resolution=64, **options)
+
+
+@pytest.mark.parametrize("shape", [HOUSE, BOTTLE, FRAME])
+def test_prior__sums_to_one_and_leaves_nothing_out(shape: Any) -> None:
+    simulator = game(shape)
+    state = simulator.initial()
+    actions = simulator.legal_actions(state)[1:]
+    prior = make_evaluator().prior(simulator, state, actions)
+    assert prior.shape == (len(actions),) and prior.sum() == pytest.approx(1.0) and prior.min() > 0.0
+
+
+def test_prior__goes_with_the_action_and_not_with_its_place() -> None:
+    simulator = game()
+    state = simulator.initial()
+    actions = simulator.legal_actions(state)[1:]
+    evaluator = make_evaluator()
+    forth, back = (evaluator.prior(simulator, state, order) for order in (actions, actions[::-1]))
+    assert forth == pytest.approx(back[::-1], rel=1e-5)
+
+
+def test_prior__is_the_same_alone_and_in_a_batch() -> None:
+    simulator, net = game(BOTTLE), make_net()
+    state, evaluator = simulator.initial(), make_evaluator(net)
+    children = evaluator.expand(simulator, state, simulator.legal_actions(state)[1:])
+    for child in children[-3:]:
+        actions = simulator.legal_actions(child)[1:]
+        alone = make_evaluator(net).prior(simulator, child, actions)
+        assert evaluator.prior(simulator, child, actions) == pytest.approx(alone, rel=1e-3)
+
+
+def test_prior__is_about_the_target_at_hand() -> None:
+    evaluator, mesh = make_evaluator(), PolyMesh.rectangle(0.2, 0.2, 0.8, 0.8)
+    for shape in (HOUSE, FRAME):
+        simulator = game(shape)
+        state = simulator.initial(mesh)
+        actions = simulator.legal_actions(state)[1:]
+        fresh = make_evaluator().prior(simulator, state, actions)
+        assert evaluator.prior(simulator, state, actions) == pytest.approx(fresh, rel=1e-6)
+
+
+def test_prior__knows_that_elements_cost_more_elsewhere() -> None:
+    actions = [Action("edge_subdivide", 0), Action("edge_extrude", 0)]  # +2 and +6 elements
+    ratios = []
+    for w_sc in (0.3, 0.5):
+        simulator = game(weights=ScoreWeights(w_sc=w_sc))
+        subdivide, extrude = make_evaluator(temperature=0.5).prior(simulator, simulator.initial(), actions)
+        ratios.append((extrude - 1e-4) / (subdivide - 1e-4))
+    assert ratios[1] / ratios[0] == pytest.approx(np.exp(-(0.5 - 0.3) * (6 - 2) / 0.5), rel=0.02)
+
+
+def test_untrained_prior__with_the_residual_is_near_it() -> None:
+    simulator = game()
+    state = simulator.initial()
+    actions = [Action("edge_subdivide", edge) for edge in range(4)]
+    net = make_net()
+    with torch.no_grad():
+        net.region_weight.zero_()
+    expected = ResidualEvaluator().prior(simulator, state, actions)
+    assert make_evaluator(net).prior(simulator, state, actions) == pytest.approx(expected, abs=1e-3)
+
+
+@pytest.mark.parametrize("placed", [True, False])
+def test_warp_expand__needs_no_refit_and_is_never_worse_than_the_bare_action(placed: bool) -> None:
+    simulator = game(BOTTLE)
+    torch.manual_seed(1)
+    warp = WarpNet(WarpConfig(image_size=32, grid=4, feature=16, widths=(4, 4, 8, 8)))
+    torch.nn.init.normal_(warp.head.weight, std=0.01)
+    evaluator = WarpEvaluator(make_net(), meta_of({}), warp, placed=placed)
+    state = simulator.initial()
+    actions = simulator.legal_actions(state)[1:]
+    children = evaluator.expand(simulator, state, actions)
+    assert [child.action for child in children] == [a for a in actions if a in {c.action for c in children}]
+    assert {child.n_refits for child in children} == {0} and {child.step for child in children} == {1}
+    if not placed:
+        for child in children:
+            assert child.action is not None
+            bare = OPERATORS[child.action.operator].apply(state.mesh, child.action.element, child.choice)
+            assert child.score.total >= simulator.score(bare).total
+            assert bare.with_vertices(child.mesh.vertices) == child.mesh
+
+
+# --- agents ---
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["nfap-prior", "nfap-mcts"])
+def test_agent__plays(name: str, weights: dict[str, str]) -> None:
+    options: dict[str, Any] = {"nfap_weights": weights["nfap"], "n": 2, "n_simulations": 4}
+    if name == "nfap-mcts":
+        options |= {"warpnet_weights": weights["warpnet"], "n_rollout": 1}
+    simulator = game(HOUSE, max_steps=3)
+    first, second = (make_agent(name, **options).solve(simulator, Budget(refits=60)) for _ in range(2))
+    assert first.score.total >= simulator.final_score(simulator.initial().mesh).total
+    assert first.sequence == second.sequence
+    assert first.sequence.final() == first.mesh
+
+
+@pytest.mark.slow
+def test_mcts_with_networks__refits_only_what_it_commits(weights: dict[str, str]) -> None:
+    agent = make_agent(
+        "nfap-mcts", nfap_weights=weights["nfap"], warpnet_weights=weights["warpnet"], n=2, n_simulations=8
+    )
+    solution = agent.solve(game(BOTTLE, max_steps=2))
+    assert solution.stats.n_refits <= 2 + 2 * 3  # two rectangles, then at most three starts for each of two steps
+
+
+@pytest.mark.parametrize("name", ["nfap-prior", "nfap-mcts"])
+def test_agent__leaves_locked_vertices_where_they_are(name: str, weights: dict[str, str]) -> None:
+    start = PolyMesh.rectangle(0.3, 0.3, 0.7, 0.7)
+    simulator = Simulator(painted(BOTTLE), resolution=64, max_steps=2, start=start, locked=[0])
+    options = {"warpnet_weights": weights["warpnet"]} if name == "nfap-mcts" else {}
+    solution = make_agent(name, nfap_weights=weights["nfap"], n=2, n_simulations=2, **options).solve(simulator)
+    assert solution.sequence.steps and solution.mesh.vertices[solution.mesh.vertex_index(0)].tolist() == [0.3, 0.3]
+
+
+def test_agent__needs_weights_of_its_n(weights: dict[str, str]) -> None:
+    with pytest.raises(ConfigError, match="n = 5: the weights foresee 2 stages"):
+        make_agent("nfap-prior", nfap_weights=weights["nfap"], n=5)
+
+
+def test_agent__without_torch_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "safetensors", None)
+    with pytest.raises(ConfigError, match=r"'nfap-mcts' needs the package safetensors.*pip install -e '\.\[learn\]'"):
+        make_agent("nfap-mcts")
+
+
+def test_algorithm_1__has_no_seeds() -> None:
+    with pytest.raises(ConfigError, match="begins at the rectangle"):
+        make_agent("nfap-mcts", seeds=["climb"])
+
+
+@pytest.mark.slow
+def test_registry__does_not_import_torch() -> None:
+    command = [sys.executable, "-c", "import sys, agents.registry; sys.exit('torch' in sys.modules)"]
+    assert subprocess.run(command, cwd=ROOT, check=False).returncode == 0
+
+
+# --- weights ---
+
+
+def test_weights__come_back_as_they_were(weights: dict[str, str]) -> None:
+    net, meta = load_nfap(weights["nfap"])
+    expected = make_net().state_dict()
+    assert net.config == RICH and meta.training["labels"]["w_sc"] == 0.3 and not net.training
+    assert all(torch.equal(tensor, expected[name]) for name, tensor in net.state_dict().items())
+
+
+def edit(path: str, **changes: Any) -> None:
+    meta = Path(path).with_suffix(".json")
+    meta.write_text(json.dumps({**json.loads(meta.read_text()), **changes}))
+
+
+def test_weights__that_are_missing_are_asked_for(tmp_path: Path, weights: dict[str, str]) -> None:
+    with pytest.raises(ConfigError, match=r"no weights at .*none\.json \(No such file"):
+        load_nfap(tmp_path / "none.safetensors")
+    Path(weights["nfap"]).unlink()
+    with pytest.raises(ConfigError, match=r"no weights at .*a\.safetensors"):
+        load_nfap(weights["nfap"])
+
+
+def test_weights__that_are_truncated_are_refused(weights: dict[str, str]) -> None:
+    path = Path(weights["nfap"])
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.raises(ConfigError, match=r"sha256 differs, \d+ bytes"):
+        load_nfap(path)
+
+
+@pytest.mark.parametrize(
+    ("changes", "complaint"),
+    [
+        ({"version": 2}, "format version 2; this code reads version 1"),
+        ({"sha256": "0" * 64}, "sha256 differs"),
+        ({"kind": "warpnet"}, "weights of 'warpnet'; expected those of 'nfap'"),
+        ({"config": {"n": 0}}, "expected 1 to 16 stages"),
+        ({"config": {"image_size": 64, "n": 2}}, "has shape .* the settings want"),
+        ({"config": {"n": "two"}}, "settings do not fit"),
+        ({"shapes": 3}, "shapes: "),
+    ],
+)
+def test_weights__that_do_not_fit_are_refused_in_a_line(
+    weights: dict[str, str], changes: dict[str, Any], complaint: str
+) -> None:
+    edit(weights["nfap"], **changes)
+    with pytest.raises(ConfigError, match=complaint) as caught:
+        load_nfap(weights["nfap"])
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "3", "\x00", "[" * 9000])
+def test_weights__with_a_broken_description_are_refused(weights: dict[str, str], text: str) -> None:
+    Path(weights["nfap"]).with_suffix(".json").write_text(text)
+    with pytest.raises(ConfigError, match=r"not JSON|format version None"):
+        load_nfap(weights["nfap"])
+
+
+def test_weights__of_something_that_is_no_safetensors_file_are_refused(weights: dict[str, str]) -> None:
+    Path(weights["nfap"]).write_bytes(b"hello")
+    edit(weights["nfap"], sha256=hashlib.sha256(b"hello").hexdigest())
+    with pytest.raises(ConfigError, match="no safetensors file"):
+        load_nfap(weights["nfap"])
+
+
+def test_shipped_weights__load_and_are_small() -> None:
+    assert load_nfap()[0].config.n == 3
+    assert load_warpnet()[0].config.image_size == 64
+    files = [path for path in SHIPPED.iterdir() if path.suffix in (".safetensors", ".json", ".md")]
+    assert len(files) == 6 and sum(path.stat().st_size for path in files) <= 10e6
+    assert N_POINTS == 8  # which the shipped weights were trained with

@@ -1,0 +1,281 @@
+"""The command `python -m agents.export`: every format read back, and one line for everything that can be wrong."""
+
+import ast
+import json
+import os
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from agents.export import main
+from autopoly_env.export import to_obj
+from autopoly_env.export.formats import FORMATS
+from autopoly_env.sequence import ConstructionSequence
+from tests.helpers.commands import Run, runner
+from tests.helpers.constructions import STEPS, house
+from tests.helpers.paths import ROOT
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Run:
+    """Runs the command in this process; gives `code`, `out` and `err`."""
+    return runner(main, capsys)
+
+
+def saved(path: str = "house.json", sequence: ConstructionSequence | None = None) -> Path:
+    Path(path).parent.mkdir(parents=True, exist_ok=True)
+    (sequence or house()).save(path)
+    return Path(path)
+
+
+def edited(change: Callable[[dict[str, Any]], object]) -> Path:
+    """The house as somebody has edited it by hand."""
+    data = json.loads(house().to_json())
+    change(data)
+    Path("edited.json").write_text(json.dumps(data))
+    return Path("edited.json")
+
+
+def target_image() -> Path:
+    picture = Image.new("L", (64, 64))
+    picture.paste(255, (16, 8, 48, 48))
+    picture.save("target.png")
+    return Path("target.png")
+
+
+# What is written
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_every_format__is_written_beside_the_sequence_and_named(run: Run, name: str) -> None:
+    saved("work/house.json")
+    done = run("work/house.json", "--to", name)
+    assert (done.code, done.err) == (0, "")
+    (written,) = set(os.listdir("work")) - {"house.json"}
+    assert done.out.split() == [f"work/{written}"]
+    assert Path(written).stem == "house" and Path("work", written).stat().st_size > 300
+
+
+def test_html__is_the_default_and_shows_the_target(run: Run) -> None:
+    assert run(saved(), "--target", target_image()).code == 0
+    page = Path("house.html").read_text(encoding="utf-8")
+    assert "data:image/png;base64," in page and "<title>house" in page
+
+
+def test_obj__is_the_last_mesh_or_that_of_a_step(run: Run) -> None:
+    meshes = house().meshes()
+    run(saved(), "--to", "obj")
+    assert Path("house.obj").read_text() == to_obj(meshes[-1])
+    for step in (0, 3):
+        run("house.json", "--to", "obj", "--step", step, "--out", "step.obj")
+        assert Path("step.obj").read_text() == to_obj(meshes[step])
+
+
+def visible_steps(root: ET.Element) -> list[str | None]:
+    return [g.get("id") for g in root if g.tag == f"{SVG}g" and "display:none" not in g.get("style", "")]
+
+
+def test_svg__has_a_group_for_each_step_and_shows_the_last(run: Run) -> None:
+    run(saved(), "--to", "svg", "--target", target_image())
+    root = ET.parse("house.svg").getroot()
+    assert [child.get("id") for child in root] == ["target", *(f"step-{k}" for k in range(len(STEPS) + 1))]
+    assert visible_steps(root) == [f"step-{len(STEPS)}"]
+    ids = [element.get("id") for element in root.iter() if element.get("id")]
+    assert len(set(ids)) == len(ids)
+    for k, mesh in enumerate(house().meshes()):
+        inside = {element.get("id") for group in root for element in group.iter() if group.get("id") == f"step-{k}"}
+        assert {f"step-{k}-vertex-{name}" for name in mesh.vertex_ids} <= inside
+        assert {f"step-{k}-face-{name}" for name in mesh.face_ids} <= inside
+        assert len(inside) == 4 + mesh.complexity  # the group itself and the three in it
+
+
+def test_svg__of_a_step_ends_there(run: Run) -> None:
+    run(saved(), "--to", "svg", "--step", 2)
+    root = ET.parse("house.svg").getroot()
+    assert [child.get("id") for child in root] == ["step-0", "step-1", "step-2"]
+    assert visible_steps(root) == ["step-2"]
+    label = "{http://www.inkscape.org/namespaces/inkscape}label"
+    assert [child.get(label) for child in root] == ["step 0: start", "step 1: edge_subdivide", "step 2: face_split"]
+
+
+def test_gif__has_a_frame_for_each_mesh(run: Run) -> None:
+    run(saved(), "--to", "gif", "--step", 4)
+    with Image.open("house.gif") as picture:
+        assert picture.n_frames == 5 and picture.is_animated
+
+
+def test_png__is_the_sheet_and_knows_the_target(run: Run) -> None:
+    run(saved(), "--to", "png", "--out", "plain.png")
+    run("house.json", "--to", "png", "--target", target_image(), "--out", "over.png")
+    plain, over = (np.asarray(Image.open(name)) for name in ("plain.png", "over.png"))
+    assert plain.shape == over.shape and (plain != over).any()
+
+
+@pytest.mark.parametrize(("name", "suffix"), [("gltf", ".gltf"), ("blender", ".py")])
+def test_depth__reaches_gltf_and_blender(run: Run, name: str, suffix: str) -> None:
+    for depth in (0, 0.25):
+        assert run(saved(), "--to", name, "--depth", depth, "--out", f"{depth}{suffix}").code == 0
+    assert Path(f"0{suffix}").read_bytes() != Path(f"0.25{suffix}").read_bytes()
+    if suffix == ".py":
+        ast.parse(Path("0.25.py").read_text())
+
+
+def test_glb__is_chosen_by_the_name_of_the_file(run: Run) -> None:
+    run(saved(), "--to", "gltf", "--out", "house.glb")
+    assert Path("house.glb").read_bytes()[:4] == b"glTF"
+
+
+def test_several__go_into_a_folder_each_by_its_own_name(run: Run) -> None:
+    sources = [saved("a/chair/sequence.json"), saved("b/chair/sequence.json"), saved("mug.json"), saved("b/mug.json")]
+    done = run(*sources, sources[0], "--to", "obj", "--out", "new/folder")
+    assert (done.code, done.err) == (0, "")
+    assert sorted(os.listdir("new/folder")) == ["chair-2.obj", "chair.obj", "mug-2.obj", "mug.obj"]
+    assert len(done.out.splitlines()) == 4  # the one named twice is written once
+
+
+def test_out__without_an_ending_is_a_folder_for_one_as_well(run: Run) -> None:
+    run(saved("chair/sequence.json"), "--to", "svg", "--out", "drawings")
+    assert os.listdir("drawings") == ["chair.svg"]
+
+
+# What can be wrong
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda data: data["steps"][2]["element"].update(edge=[0, 2]), "step 3, edge_extrude edge 0–2: no edge joins"),
+        (lambda data: data["steps"][2]["element"].update(edge=[2, 4]), "step 3, edge_extrude edge 2–4: edge_extrude"),
+        (
+            lambda data: data["steps"][0]["element"].update(edge=[0, 77]),
+            "step 1, edge_subdivide edge 0–77: vertex id 77",
+        ),
+        (lambda data: data["steps"][6]["element"].update(face=9), "step 7, face_delete face 9: face id 9"),
+        (lambda data: data["steps"][3].update(operator="melt"), "step 4, melt face 0, sides 3: operator 'melt'"),
+        (
+            lambda data: data["steps"][0]["moved"].append([4, "x", 0]),
+            "step 1: moved.1.1: Input should be a valid number",
+        ),
+        (lambda data: data["steps"][0].pop("score"), "step 1: score: Field required"),
+        (lambda data: data.update(version=2), "the version is 2; this release reads version 1"),
+        (lambda data: data.update(format="tale"), "the format is 'tale'"),
+    ],
+)
+def test_illegal_step__is_told_in_one_line_and_nothing_is_written(run: Run, change: Any, message: str) -> None:
+    for name in FORMATS:
+        done = run(edited(change), "--to", name, "--out", "results/")
+        assert (done.code, done.out, len(done.err.splitlines())) == (1, "", 1)
+        assert done.err.startswith(f"error: edited.json: {message}")
+        assert os.listdir() == ["edited.json"]
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "not JSON"),
+        (b"{", "not JSON"),
+        (b"[" * 100_000, "not JSON"),
+        (b'{"format": NaN}', "not JSON (NaN is no finite number)"),
+        (b"\xff\xfe\x00", "not UTF-8 text"),
+        (b"7", "the format is 7"),
+        (house().to_json().encode()[:900], "not JSON"),
+    ],
+)
+def test_broken_file__is_told_in_one_line(run: Run, content: bytes, message: str) -> None:
+    Path("broken.json").write_bytes(content)
+    done = run("broken.json")
+    assert (done.code, done.out, len(done.err.splitlines())) == (1, "", 1)
+    assert "broken.json" in done.err and message in done.err
+    assert os.listdir() == ["broken.json"]
+
+
+def test_missing_file__does_not_keep_the_others_from_being_written(run: Run) -> None:
+    done = run("none.json", ".", saved(), "--out", "results")
+    assert done.code == 1 and done.out.split() == ["results/house.html"]
+    assert [line.split(" (")[0] for line in done.err.splitlines()] == [
+        "error: cannot read none.json",
+        "error: cannot read .",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ([], "Missing argument"),
+        (
+            ["house.json", "--to", "fbx"],
+            "--to fbx: unknown format; give one of html, svg, obj, gltf, gif, png, blender",
+        ),
+        (["house.json", "--to", "obj", "--depth", "1"], "--depth 1.0: obj is flat; use it with gltf, blender"),
+        (["house.json", "--to", "gltf", "--depth", "nan"], "depth nan"),
+        (["house.json", "--to", "gltf", "--depth", "-1"], "depth -1.0"),
+        (["house.json", "--to", "obj", "--target", "t.png"], "--target t.png: obj shows no target; use it with html"),
+        (["house.json", "--to", "gltf", "--out", "house.txt"], "expected a file name that ends in .gltf"),
+        (["house.json", "--out", "house.json"], "house.json: is a sequence"),
+        (["house.json", "--step", "two"], "--step"),
+    ],
+)
+def test_wrong_usage__is_one_line_and_exit_code_2(run: Run, arguments: list[str], message: str) -> None:
+    before = saved().read_bytes()
+    done = run(*arguments)
+    assert (done.code, done.out, len(done.err.splitlines())) == (2, "", 1)
+    assert done.err.startswith("error: ") and message in done.err
+    assert os.listdir() == ["house.json"] and Path("house.json").read_bytes() == before
+
+
+@pytest.mark.parametrize("step", [-1, 8])
+def test_step__that_there_is_not_is_one_line(run: Run, step: int) -> None:
+    done = run(saved(), "--step", step)
+    assert (done.code, done.out, os.listdir()) == (1, "", ["house.json"])
+    assert done.err == f"error: house.json: cannot trim 7 steps to {step}; give 0..7\n"
+
+
+def test_target__that_is_no_image_is_one_line(run: Run) -> None:
+    Path("text.png").write_text("no image")
+    for image in ("text.png", "none.png"):
+        done = run(saved(), "--target", image)
+        assert (done.code, done.out, len(done.err.splitlines())) == (1, "", 1)
+        assert image in done.err
+    assert sorted(os.listdir()) == ["house.json", "text.png"]
+
+
+def test_place__that_cannot_be_written_is_one_line(run: Run) -> None:
+    Path("file").touch()
+    for name in FORMATS:
+        done = run(saved(), "--to", name, "--out", f"file/house{FORMATS[name].suffix}")
+        assert (done.code, done.out, len(done.err.splitlines())) == (1, "", 1)
+        assert "cannot write file/house" in done.err
+
+
+def test_ctrl_c__is_one_line_and_leaves_nothing(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    saved()
+    monkeypatch.setattr("autopoly_env.files.os.replace", interrupted)
+    done = run("house.json")
+    assert (done.code, done.out, done.err) == (130, "", "error: stopped by Ctrl-C\n")
+    assert os.listdir() == ["house.json"]
+
+
+def test_help__names_every_format_and_loads_nothing_heavy() -> None:
+    heavy = {"numba", "skimage", "shapely"}
+    code = f"import sys, agents.export; agents.export.main(['--help']); assert not {heavy} & set(sys.modules)"
+    env = os.environ | {"PYTHONPATH": str(ROOT)}
+    shown = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True).stdout
+    assert set(FORMATS) <= set(shown.replace(",", " ").replace(".", " ").split())
+    assert "python -m agents.export out/chair/sequence.json" in shown

@@ -1,0 +1,48 @@
+"""The registry: agents by name, their options, and what it says of wrong ones."""
+
+from typing import Any
+
+import pytest
+
+from agents.registry import AGENTS, make_agent
+from autopoly_env.errors import ConfigError
+from tests.helpers.solving import simulator
+
+
+def test_registry__names_agents_after_themselves() -> None:
+    assert {"random", "greedy", "beam", "trace", "climb"} <= {*AGENTS}
+    for name in AGENTS:
+        try:
+            assert make_agent(name).name == name
+        except ConfigError as error:
+            assert "comes without weights" in str(error) and "weights=PATH" in str(error)
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "complaint"),
+    [
+        ("bean", {}, r"agent 'bean' is unknown; give one of .*\bbeam\b"),
+        ("beam", {"witdh": 4}, r"agent 'beam' has no option 'witdh'; its options are width, "),
+        ("beam", {"width": "wide"}, r"agent 'beam', option width: .* got 'wide'"),
+        ("beam", {"width": 2.5}, r"agent 'beam', option width: .* got 2.5"),
+        ("beam", {"width": 0}, "a width and a patience of at least 1"),
+        ("beam", {"patience": 0}, "a width and a patience of at least 1"),
+        ("beam", {"merge_grid": float("nan")}, "a positive merge_grid"),
+        ("random", {"seed": -1}, "seed -1: expected at least 0"),
+        ("trace", {"prices": ()}, "prices"),
+        ("trace", {"prices": (2.0, 1.0)}, "prices"),
+        ("trace", {"prices": (0.0,)}, "prices"),
+        ("trace", {"prices": ("dear",)}, r"agent 'trace', option prices.0: .* got 'dear'"),
+        ("trace", {"n_constructed": 0}, "n_constructed 0: expected at least 1"),
+    ],
+)
+def test_registry__says_in_one_line_what_is_wrong(name: str, options: dict[str, Any], complaint: str) -> None:
+    with pytest.raises(ConfigError, match=complaint) as caught:
+        make_agent(name, **options)
+    assert "\n" not in str(caught.value)
+
+
+def test_registry__reads_options_as_a_command_line_gives_them() -> None:
+    game = simulator()
+    as_text, as_number = make_agent("beam", width="2", patience="1"), make_agent("beam", width=2, patience=1)
+    assert as_text.solve(game).sequence == as_number.solve(game).sequence

@@ -1,0 +1,455 @@
+"""The command `python -m agents.solve`: what it writes, prints and returns, and what Ctrl-C leaves behind."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from PIL import Image
+
+from agents.base import Decision
+from agents.baselines.beam import BeamAgent, BeamConfig
+from agents.commands.results import RESULTS
+from agents.registry import AGENTS
+from agents.solve import main
+from autopoly_env.score import ScoreWeights, score
+from autopoly_env.sequence import ConstructionSequence
+from autopoly_env.silhouette import load_silhouette
+from autopoly_env.simulator import Simulator, State
+from tests.helpers.commands import Run, runner
+from tests.helpers.paths import EXAMPLES, ROOT
+from tests.helpers.shapes import shapely_coverage
+
+QUICK = ("--resolution", "64")
+COLUMNS = ["name", "r_sm", "r_sc", "r_si", "r_all", "actions", "valid", "blocking_in", "moved", "refits", "seconds"]
+RECORD_KEYS = [
+    *("image", "name", "agent", "settings", "seed", "r_sm", "r_sc", "r_si", "r_all", "V", "E", "F"),
+    *("actions", "valid", "blocking_in", "moved", "refits", "seconds", "stopped_by", "notes", "files"),
+]
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Run:
+    """Runs the command in this process; gives `code`, `out` and `err`."""
+    return runner(main, capsys)
+
+
+def small_image(path: str, *, box: tuple[int, int, int, int] = (8, 8, 40, 56)) -> Path:
+    """A white rectangle on 64 x 64 black pixels."""
+    picture = Image.new("L", (64, 64))
+    picture.paste(255, box)
+    Path(path).parent.mkdir(parents=True, exist_ok=True)
+    picture.save(path)
+    return Path(path)
+
+
+def read_obj(path: str) -> tuple[np.ndarray, list[list[int]]]:
+    """Vertices (V, 2) with y down, and the faces, read as any other program would."""
+    rows = [line.split() for line in Path(path).read_text().splitlines()]
+    vertices = np.array([[float(row[1]), 1.0 - float(row[2])] for row in rows if row[0] == "v"])
+    return vertices, [[int(v) - 1 for v in row[1:]] for row in rows if row[0] == "f"]
+
+
+# What is written and printed
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("agent", "name"), [("trace", "mug"), ("greedy", "table")])
+def test_solve__writes_results_that_agree_with_its_record_and_with_shapely(run: Run, agent: str, name: str) -> None:
+    image = EXAMPLES / f"{name}.png"
+    done = run(image, "--agent", agent, "--json", "--w-sc", "0.5", *QUICK)
+    assert done.code == 0
+    (record,) = map(json.loads, done.out.splitlines())
+    assert list(record) == RECORD_KEYS
+    assert (record["image"], record["name"], record["agent"]) == (str(image), name, agent)
+    assert record["files"] == {file: f"out/{name}/{file}" for file in RESULTS}
+
+    vertices, faces = read_obj(record["files"]["mesh.obj"])
+    pairs = {frozenset((face[k - 1], v)) for face in faces for k, v in enumerate(face)}
+    assert (record["V"], record["E"], record["F"]) == (len(vertices), len(pairs), len(faces))
+    assert record["r_sc"] == len(vertices) + len(pairs) + len(faces)
+    shape = shapely.union_all([shapely.Polygon(vertices[face]) for face in faces])
+    wanted = np.asarray(Image.open(image).convert("L")) > 127
+    covered = shapely_coverage(shape, len(wanted)) >= 0.5
+    iou = (covered & wanted).sum() / (covered | wanted).sum()
+    assert record["r_sm"] == pytest.approx(iou, abs=1e-5)
+    assert record["r_all"] == pytest.approx(100 * record["r_sm"] - 0.5 * record["r_sc"] - 5 * record["r_si"])
+
+
+@pytest.mark.slow
+def test_solve__records_a_sequence_that_replays_to_the_mesh(run: Run) -> None:
+    done = run(EXAMPLES / "mug.png", "--json", "--seed", 7, *QUICK)
+    record = json.loads(done.out)
+    sequence = ConstructionSequence.load(record["files"]["sequence.json"])
+    mesh = sequence.final()
+    assert len(sequence.steps) == record["actions"] > 0
+    assert sequence.settings == record["settings"]
+    assert (sequence.settings["agent"], sequence.settings["seed"]) == ("mcts", 7)
+    assert np.allclose(read_obj(record["files"]["mesh.obj"])[0], mesh.vertices)
+    target = load_silhouette(EXAMPLES / "mug.png").target(512)
+    assert score(mesh, target, ScoreWeights()).total == record["r_all"] == sequence.steps[-1].score["total"]
+    assert Path(record["files"]["mesh.svg"]).read_text().startswith("<svg")
+    assert min(Image.open(record["files"]["steps.png"]).size) > 200
+
+
+@pytest.mark.slow
+def test_solve__shows_a_table_with_means_and_names_the_overview_last(run: Run) -> None:
+    done = run(EXAMPLES / "bottle.png", EXAMPLES / "mug.png", "--out", "deep/results", *QUICK)
+    lines = done.out.splitlines()
+    assert (done.code, done.err) == (0, "")
+    assert COLUMNS in [line.split() for line in lines]
+    rows = {line.split()[0]: line.split()[1:] for line in lines if line.strip()}
+    totals = [float(rows[name][3]) for name in ("bottle", "mug")]
+    assert float(rows["mean"][5]) == pytest.approx(np.mean(totals), abs=0.011)  # after "of 2" and three columns
+    assert "note: object has 1 hole: mug" in lines
+    assert lines[-1] == "Open deep/results/overview.png"
+    assert Image.open("deep/results/overview.png").width == 2 * 256
+
+
+@pytest.mark.slow
+def test_solve__of_one_image_names_its_sheet_and_writes_no_overview(run: Run) -> None:
+    small_image("box.png")
+    done = run("box.png")
+    assert done.out.splitlines()[-1] == "Open out/box/steps.png"
+    assert "mean" not in done.out
+    assert sorted(os.listdir("out")) == ["box"]
+    assert sorted(os.listdir("out/box")) == sorted(RESULTS)
+
+
+@pytest.mark.slow
+def test_quiet__leaves_the_table_and_the_warnings(run: Run) -> None:
+    small_image("box.png")
+    Image.radial_gradient("L").save("photo.png")
+    done = run("box.png", "photo.png", "--quiet")
+    assert done.err == ""
+    assert "note:" not in done.out
+    assert "warning: photo.png: more than two clear levels" in done.out
+
+
+def test_json__prints_nothing_else_on_stdout(run: Run) -> None:
+    small_image("pictures/b.png")
+    small_image("pictures/a.png")
+    done = run("pictures", "missing.png", "--json")
+    records = [json.loads(line) for line in done.out.splitlines()]
+    assert [record["image"] for record in records] == ["missing.png", "pictures/a.png", "pictures/b.png"]
+    assert "matches no image" in records[0]["error"]
+    assert done.err.splitlines() == [f"error: {records[0]['error']}", "Open out/overview.png"]
+
+
+@pytest.mark.slow
+def test_images__of_the_same_name_get_folders_of_their_own(run: Run) -> None:
+    images = [small_image("a/box.png"), small_image("b/box.png", box=(4, 4, 20, 20)), small_image("box-2.png")]
+    done = run(*images)
+    assert sorted(os.listdir("out")) == ["box", "box-2", "box-2-2", "overview.png"]
+    assert "warning: b/box.png: called box-2 here, for a/box.png has its name, too" in done.out
+    areas = [shapely.Polygon(read_obj(f"out/{name}/mesh.obj")[0]).area for name in ("box", "box-2", "box-2-2")]
+    assert areas == pytest.approx([32 * 48 / 64**2, (16 / 64) ** 2, 32 * 48 / 64**2], rel=0.1)
+
+
+@pytest.mark.slow
+def test_image__named_twice_is_solved_once(run: Run) -> None:
+    small_image("a/box.png")
+    assert len(run("a", "a/box.png", "a/*.png", "--json").out.splitlines()) == 1
+
+
+@pytest.mark.slow
+def test_results__do_not_depend_on_threads_or_on_the_images_before(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    images = [EXAMPLES / "table.png", EXAMPLES / "bottle.png"]
+    options = ("--resolution", "64", "--refits", "150", "--seed", "3")
+    for agent in ("random", "beam"):
+        monkeypatch.setenv("AUTOPOLY_THREADS", "1")
+        assert run(*images, "--agent", agent, *options, "--out", "one").code == 0
+        monkeypatch.setenv("AUTOPOLY_THREADS", "2")
+        assert run(*reversed(images), "--agent", agent, *options, "--out", "two").code == 0
+        for name in ("table", "bottle"):
+            assert Path(f"one/{name}/sequence.json").read_bytes() == Path(f"two/{name}/sequence.json").read_bytes()
+
+
+def test_option__reaches_the_agent_and_wins_over_the_seed(run: Run) -> None:
+    small_image("box.png")
+    done = run("box.png", "--agent", "random", "--option", "n_steps=2", "--option", "seed=5", "--json", *QUICK)
+    settings = json.loads(done.out)["settings"]
+    assert settings["options"] == {"n_steps": 2, "seed": 5}
+    assert settings["seed"] == 5
+
+
+def test_max_steps_and_refits__limit_the_work(run: Run) -> None:
+    done = run(EXAMPLES / "chair.png", "--agent", "greedy", "--max-steps", 1, "--json", *QUICK)
+    assert json.loads(done.out)["actions"] == 1
+    done = run(EXAMPLES / "chair.png", "--agent", "greedy", "--refits", 1, "--json", *QUICK)
+    assert json.loads(done.out)["stopped_by"] == "refits"
+
+
+# What can be wrong
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ([], "Missing argument"),
+        (["box.png", "--agnet", "trace"], "No such option: --agnet"),
+        (["box.png", "--agent", "nobody"], "agent 'nobody' is unknown; give one of random, greedy"),
+        (["box.png", "--operators", "paper,edge_melt"], "edge_melt"),
+        (["box.png", "--resolution", "four"], "--resolution"),
+        (["box.png", "--resolution", "4"], "expected 8 to 1024"),
+        (["box.png", "--w-sc", "-1"], "w_sc = -1.0"),
+        (["box.png", "--refits", "-1"], "a budget of -1 refits"),
+        (["box.png", "--max-steps", "-1"], "max_steps -1"),
+        (["box.png", "--option", "width"], "expected key=value"),
+        (["box.png", "--option", "name=3"], "agent 'mcts' has no option 'name'"),
+        (["box.png", "--option", "width=3"], "agent 'mcts' has no option 'width'"),
+        (["box.png", "--agent", "beam", "--option", "width=wide"], "option width"),
+        (["box.png", "--agent", "beam", "--option", "width=0"], "width"),
+        (["box/steps.png", "box.png", "--out", "."], "would overwrite the image box/steps.png"),
+        (["overview.png", "--out", "."], "would overwrite the image overview.png"),
+    ],
+)
+def test_wrong_usage__is_one_line_and_exit_code_2(run: Run, arguments: list[str], message: str) -> None:
+    for image in ("box.png", "overview.png", "box/steps.png"):
+        small_image(image)
+    done = run(*arguments)
+    assert (done.code, done.out, len(done.err.splitlines())) == (2, "", 1)
+    assert done.err.startswith("error: ")
+    assert message in done.err
+    assert not Path("out").exists()
+
+
+def test_bad_images__are_reported_one_by_one_and_stop_nothing(run: Run) -> None:
+    small_image("good.png")
+    Path("cut.png").write_bytes((EXAMPLES / "chair.png").read_bytes()[:700])
+    Path("text.png").write_text("no image")
+    Image.new("L", (64, 64)).save("black.png")
+    Path("empty").mkdir()
+    done = run("missing.png", "none*.png", "empty", "cut.png", "text.png", "black.png", "good.png", *QUICK)
+    problems = done.err.splitlines()
+    assert done.code == 1
+    for problem, bad in zip(problems, ["missing", "none*", "empty", "cut", "text", "black"], strict=True):
+        assert problem.startswith("error: ")
+        assert bad in problem
+    assert os.listdir("out") == ["good"]
+    assert "Traceback" not in done.out + done.err
+
+
+def test_out__that_cannot_be_written_is_found_out_before_the_work(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    small_image("box.png")
+    monkeypatch.setattr("agents.commands.solving.load_silhouette", lambda *_, **__: pytest.fail("the work has begun"))
+    Path("file").write_text("")
+    done = run("box.png", "--out", "file/out")
+    assert (done.code, done.out, len(done.err.splitlines())) == (1, "", 1)
+    assert done.err.startswith("error: cannot write to the folder file/out")
+
+
+@pytest.mark.slow
+def test_failed_write__leaves_nothing_behind(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    small_image("box.png")
+    small_image("other.png")
+    assert run("box.png").code == 0
+    before = {file: Path(f"out/box/{file}").read_bytes() for file in RESULTS}
+
+    def full_disk(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("agents.commands.results.save_png", full_disk)
+        done = run("box.png", "other.png", "--w-sc", "3")
+    assert done.code == 1
+    for line, name in zip(done.err.splitlines(), ("box", "other"), strict=True):
+        assert line.startswith(f"error: {name}.png: cannot write the results to out/{name} (No space left on device)")
+    assert {file: Path(f"out/box/{file}").read_bytes() for file in RESULTS} == before
+    assert os.listdir("out") == ["box"]
+
+
+@pytest.mark.slow
+def test_stdout__that_takes_nothing_more_is_one_line(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    small_image("box.png")
+
+    class Full:
+        encoding = "utf-8"
+
+        def write(self, _: str) -> None:
+            raise OSError(28, "No space left on device")
+
+        def flush(self) -> None: ...
+
+        def isatty(self) -> bool:
+            return False
+
+    for arguments in (["box.png"], ["box.png", "--json"]):
+        monkeypatch.setattr(sys, "stdout", Full())
+        done = run(*arguments)
+        assert done.code == 1
+        assert done.err == "error: cannot print the results (No space left on device); give them another place to go\n"
+
+
+# Agents that misbehave on purpose, and Ctrl-C
+
+
+@dataclass(frozen=True)
+class NoConfig:
+    """An agent without options."""
+
+
+@pytest.fixture
+def agent_that(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[Callable[[State], Any]], None]]:
+    """Registers `probe`: a greedy agent that calls a function of the state before every step."""
+
+    def register(does: Callable[[State], Any]) -> None:
+        class Probe(BeamAgent):
+            def _search(self, simulator: Simulator, track: Any, meter: Any) -> Any:
+                return super(BeamAgent, self)._search(simulator, track, meter)  # step by step
+
+            def act(self, simulator: Simulator, state: State) -> Decision:
+                does(state)
+                return super().act(simulator, state)
+
+        monkeypatch.setitem(AGENTS, "probe", (lambda config: Probe(BeamConfig(width=1)), NoConfig()))
+
+    yield register
+
+
+def press_ctrl_c() -> None:
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+@pytest.mark.parametrize("error", [MemoryError("Unable to allocate 3 GiB"), ValueError("two\nlines"), RecursionError()])
+def test_unexpected_error__is_one_line_with_its_type(run: Run, agent_that: Any, error: Exception) -> None:
+    def fail(_: State) -> None:
+        raise error
+
+    agent_that(fail)
+    small_image("box.png")  # is matched by the initial rectangle: the agent is not asked
+    done = run(EXAMPLES / "chair.png", "box.png", "--agent", "probe", *QUICK)
+    assert (done.code, len(done.err.splitlines())) == (1, 1)
+    assert done.err.startswith(f"error: {EXAMPLES / 'chair.png'}: {type(error).__name__}: ")
+    assert os.listdir("out") == ["box"]
+
+
+def test_ctrl_c_in_a_search__writes_the_best_so_far_and_stops(run: Run, agent_that: Any) -> None:
+    agent_that(lambda state: press_ctrl_c() if state.step == 2 else None)
+    shutil.copy(EXAMPLES / "chair.png", "chair.png")
+    small_image("later.png")
+    done = run("chair.png", "later.png", "--agent", "probe", "--json", *QUICK)
+    (record,) = map(json.loads, done.out.splitlines())
+    assert done.code == 130
+    assert (record["stopped_by"], record["actions"]) == ("interrupted", 2)
+    assert len(ConstructionSequence.load("out/chair/sequence.json").steps) == 2
+    assert sorted(os.listdir("out/chair")) == sorted(RESULTS)
+    assert "stopped by Ctrl-C: 1 of 2 images left" in done.err
+
+
+@pytest.mark.slow
+def test_ctrl_c_outside_a_search__waits_until_the_image_is_written(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted_sheet(*_: object) -> Image.Image:
+        press_ctrl_c()
+        return Image.new("RGB", (300, 300))
+
+    monkeypatch.setattr("agents.commands.results.contact_sheet", interrupted_sheet)
+    done = run(small_image("a.png"), small_image("b.png"), small_image("c.png"))
+    assert done.code == 130
+    assert sorted(os.listdir("out/a")) == sorted(RESULTS)
+    assert sorted(os.listdir("out")) == ["a"]
+    assert "stopped by Ctrl-C: 2 of 3 images left" in done.err
+    assert done.out.splitlines()[-1] == "Open out/a/steps.png"
+
+
+@pytest.mark.slow
+def test_ctrl_c_while_an_image_loads__leaves_that_image(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted_load(path: Path, name: str) -> Any:
+        press_ctrl_c()
+        return load_silhouette(path, name=name)
+
+    monkeypatch.setattr("agents.commands.solving.load_silhouette", interrupted_load)
+    done = run(small_image("a.png"), small_image("b.png"))
+    assert (done.code, done.out, os.listdir("out")) == (130, "", [])
+    assert "stopped by Ctrl-C: 2 of 2 images left" in done.err
+
+
+@pytest.mark.slow
+def test_second_ctrl_c__aborts_and_leaves_nothing_half_written(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def impatient_sheet(*_: object) -> Image.Image:
+        press_ctrl_c()
+        press_ctrl_c()
+        pytest.fail("the second Ctrl-C was not heard")
+
+    handler = signal.getsignal(signal.SIGINT)
+    monkeypatch.setattr("agents.commands.results.contact_sheet", impatient_sheet)
+    done = run(small_image("a.png"), small_image("b.png"))
+    assert (done.code, done.out, os.listdir("out")) == (130, "", [])
+    assert "aborted" in done.err
+    assert signal.getsignal(signal.SIGINT) is handler
+
+
+@pytest.mark.slow
+def test_second_ctrl_c__waits_while_files_are_moved_into_place(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def impatient_replace(source: Path, goal: Path) -> None:
+        press_ctrl_c()
+        real_replace(source, goal)
+
+    real_replace = os.replace
+    monkeypatch.setattr("agents.commands.results.os", SimpleNamespace(replace=impatient_replace))
+    done = run(small_image("a.png"), small_image("b.png"))
+    assert done.code == 130
+    assert (os.listdir("out"), sorted(os.listdir("out/a"))) == (["a"], sorted(RESULTS))
+
+
+@pytest.mark.slow
+def test_ctrl_c_in_the_shell__leaves_finished_images_whole() -> None:
+    for k in range(40):
+        small_image(f"pictures/{k:02}.png", box=(8, 8, 20 + k, 56))
+    command = [sys.executable, "-m", "agents.solve", "pictures", "--json", *QUICK]
+    env = os.environ | {"PYTHONPATH": str(ROOT)}
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=env) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        first = [process.stdout.readline() for _ in range(2)]
+        process.send_signal(signal.SIGINT)
+        records = [json.loads(line) for line in (*first, *process.stdout.read().splitlines())]
+        messages = process.stderr.read()
+    assert process.returncode == 130
+    assert 2 <= len(records) < 40
+    assert f"stopped by Ctrl-C: {40 - len(records)} of 40 images left" in messages
+    assert sorted(os.listdir("out")) == sorted([*(record["name"] for record in records), "overview.png"])
+    for record in records:
+        assert sorted(os.listdir(f"out/{record['name']}")) == sorted(RESULTS)
+        assert ConstructionSequence.load(record["files"]["sequence.json"]).final().counts == (
+            record["V"],
+            record["E"],
+            record["F"],
+        )
+    assert not list(Path("out").rglob("*.tmp"))
+
+
+def test_simulations__limit_a_tree_search_and_are_refused_by_others(run: Run) -> None:
+    image = EXAMPLES / "chair.png"
+    done = run(image, "--agent", "mcts", "--option", "seeds=[]", "--simulations", 0, "--json", *QUICK)
+    assert json.loads(done.out)["stopped_by"] == "simulations"
+    refused = run(image, "--agent", "trace", "--simulations", 3)
+    assert refused.code == 2 and "trace runs no simulations" in refused.err
+
+
+# The help
+
+
+def test_help__names_every_agent_and_loads_nothing_heavy() -> None:
+    heavy = {"numba", "skimage", "shapely"}
+    code = f"import sys, agents.solve; agents.solve.main(['--help']); assert not {heavy} & set(sys.modules)"
+    env = os.environ | {"PYTHONPATH": str(ROOT)}
+    shown = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True).stdout
+    assert set(AGENTS) <= set(shown.replace(",", " ").replace(".", " ").split())
+    assert "python -m agents.solve examples" in shown
+    assert "[default: 128]" in shown

@@ -1,0 +1,82 @@
+"""Files are whole or not there."""
+
+import errno
+import os
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from autopoly_env.errors import OutputError
+from autopoly_env.files import write_atomically
+
+
+@pytest.mark.parametrize(("data", "stored"), [("ümlaut\n", "ümlaut\n".encode()), (b"\x00\xff", b"\x00\xff")])
+def test_write__makes_folders_and_replaces_what_was_there(tmp_path: Path, data: str | bytes, stored: bytes) -> None:
+    path = tmp_path / "a" / "b" / "file"
+    assert write_atomically(path, b"old and longer") == path == write_atomically(str(path), data)
+    assert path.read_bytes() == stored
+    assert [p.name for p in path.parent.iterdir()] == ["file"]
+
+
+def test_write__follows_a_link(tmp_path: Path) -> None:
+    (tmp_path / "folder").mkdir()
+    link = tmp_path / "latest"
+    link.symlink_to(tmp_path / "folder" / "file")
+    write_atomically(link, "text")
+    assert link.is_symlink() and (tmp_path / "folder" / "file").read_text() == "text"
+
+
+@pytest.mark.parametrize(
+    ("failure", "raised"), [(OSError(errno.ENOSPC, "No space"), OutputError), (KeyboardInterrupt(), KeyboardInterrupt)]
+)
+def test_write__leaves_the_old_file_and_nothing_else_when_it_fails(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failure: BaseException, raised: type[BaseException]
+) -> None:
+    path = tmp_path / "file"
+    path.write_text("old")
+
+    def fail(part: Any, _target: Any) -> None:
+        assert Path(part).parent == tmp_path and Path(part).read_text() == "new"
+        raise failure
+
+    monkeypatch.setattr(os, "replace", fail)
+    with pytest.raises(raised):
+        write_atomically(path, "new")
+    assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("file", "old")]
+
+
+def test_write__removes_the_half_that_fitted_on_a_full_disk(tmp_path: Path) -> None:
+    resource = pytest.importorskip("resource")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (65536, limits[1]))
+    try:
+        with pytest.raises(OutputError, match=r"cannot write .*big.* \(File too large\)"):
+            write_atomically(tmp_path / "big", bytes(1 << 20))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("place", ["file/below", "folder"])
+def test_write__refuses_an_impossible_place_in_one_line(tmp_path: Path, place: str) -> None:
+    (tmp_path / "file").touch()
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(OutputError, match=re.escape(f"cannot write {tmp_path / place} (")) as caught:
+        write_atomically(tmp_path / place, "text")
+    assert "\n" not in str(caught.value)
+    assert sorted(p.name for p in tmp_path.rglob("*")) == ["file", "folder"]
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write anywhere")
+def test_write__refuses_an_unwritable_folder(tmp_path: Path) -> None:
+    tmp_path.chmod(0o500)
+    with pytest.raises(OutputError, match="Permission denied"):
+        write_atomically(tmp_path / "file", "text")
+
+
+@pytest.mark.skipif(not Path("/dev/null").is_char_device(), reason="there is no /dev/null")
+def test_write__never_replaces_a_device() -> None:
+    with pytest.raises(OutputError, match="no ordinary file"):
+        write_atomically("/dev/null", "text")

@@ -1,0 +1,172 @@
+"""`map_tasks`: the same results from every engine, whatever happens to the workers."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import closing
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from autopoly_env.errors import ConfigError
+from tests.helpers.odd_jobs import Job, do
+from tests.helpers.paths import ROOT
+from training import parallel
+from training.parallel import map_tasks
+
+pytestmark = pytest.mark.slow  # processes start and are killed, Ray is loaded
+
+needs_ray = pytest.mark.skipif(find_spec("ray") is None, reason="Ray is not installed: pip install -e '.[cluster]'")
+SQUARES: list[Job] = [("square", x) for x in range(20)]
+
+
+def results(jobs: list[Job], **options: Any) -> dict[Job, Any]:
+    """The value or else the error of every job."""
+    return {done.task: done.value if done.error is None else done.error for done in map_tasks(do, jobs, **options)}
+
+
+def is_running(pid: int) -> bool:
+    """Whether there is such a process, zombies aside."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def wait_until(holds: Any, seconds: float = 15.0) -> bool:
+    deadline = time.monotonic() + seconds
+    while not holds() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    return bool(holds())
+
+
+@pytest.mark.parametrize(("engine", "n_workers"), [("serial", None), ("process", 1), ("process", 3)])
+def test_every_task__is_done_once(engine: str, n_workers: int | None) -> None:
+    begun: list[Job] = []
+    done = list(map_tasks(do, SQUARES, engine=engine, n_workers=n_workers, on_start=begun.append))
+    assert sorted(one.value or 0 for one in done) == [x * x for x in range(20)]
+    assert {one.task: one.value for one in done} == {("square", x): x * x for x in range(20)}
+    assert begun == SQUARES
+
+
+@pytest.mark.parametrize("engine", ["serial", "process"])
+def test_exception__fails_its_task_alone_in_one_line(engine: str) -> None:
+    found = results([("square", 2), ("fail", "five\nis bad"), ("square", 3)], engine=engine, n_workers=1)
+    assert found[("square", 2)] == 4
+    assert found[("square", 3)] == 9
+    assert found[("fail", "five\nis bad")].startswith("ValueError: five is bad (in odd_jobs.py line ")
+
+
+def test_dead_worker__is_noticed_and_its_task_tried_again(tmp_path: Path) -> None:
+    jobs: list[Job] = [*SQUARES[:5], ("exit", 7), ("die once", str(tmp_path / "flag")), *SQUARES[5:]]
+    found = results(jobs, engine="process", n_workers=2)
+    assert found.pop(("exit", 7)) == "its worker died 2 times (exit code 7)"
+    assert found.pop(("die once", str(tmp_path / "flag"))) == "survived"
+    assert found == {("square", x): x * x for x in range(20)}
+
+
+def test_worker__has_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OMP_NUM_THREADS", "3")
+    found = results([("threads", None)], engine="process", n_workers=1)
+    assert found[("threads", None)] == ("1", 1)
+    assert os.environ["OMP_NUM_THREADS"] == "3"  # what is set for workers is not left behind
+
+
+def test_large_tasks_and_results__pass_and_others_are_told(tmp_path: Path) -> None:
+    big = "x" * 3_000_000
+    assert results([("length", big)], engine="process", n_workers=1)[("length", big)] == 3_000_000
+    (problem,) = results([("lambda", 1)], engine="process", n_workers=1).values()
+    assert problem.startswith("the result cannot be sent: ")
+
+
+@pytest.mark.parametrize(("engine", "most"), [("serial", 1), ("process", 2)])
+def test_tasks__are_read_only_as_they_are_taken(engine: str, most: int) -> None:
+    n_read = 0
+
+    def endless() -> Iterator[Job]:
+        nonlocal n_read
+        while True:
+            n_read += 1
+            yield "square", n_read
+
+    with closing(map_tasks(do, endless(), engine=engine, n_workers=most)) as stream:
+        for n_done, _ in zip(range(1, 200), stream, strict=False):
+            assert n_read <= n_done + most
+
+
+def test_closing__stops_the_workers(tmp_path: Path) -> None:
+    pid_file = tmp_path / "pid"
+    stream = map_tasks(do, [("linger", str(pid_file)), ("square", 1)], engine="process", n_workers=2)
+    assert next(stream).value == 1
+    assert wait_until(lambda: pid_file.exists() and pid_file.read_text())
+    pid = int(pid_file.read_text())
+    assert is_running(pid)
+    stream.close()
+    assert not is_running(pid)
+
+
+def test_killed_parent__leaves_no_worker_behind(tmp_path: Path) -> None:
+    pid_file = tmp_path / "pid"
+    code = (
+        "from tests.helpers.odd_jobs import do; from training.parallel import map_tasks\n"
+        f"if __name__ == '__main__': list(map_tasks(do, [('linger', {str(pid_file)!r})], n_workers=1))"
+    )
+    script = tmp_path / "script.py"
+    script.write_text(code)
+    with subprocess.Popen([sys.executable, script], env=os.environ | {"PYTHONPATH": str(ROOT)}) as parent:
+        assert wait_until(lambda: pid_file.exists() and pid_file.read_text())
+        pid = int(pid_file.read_text())
+        assert is_running(pid)
+        parent.send_signal(signal.SIGKILL)
+    assert wait_until(lambda: not is_running(pid), 5.0)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"engine": "dask"}, "engine 'dask' is unknown; give one of serial, process, ray"),
+        ({"n_workers": 0}, "0 workers: expected at least 1"),
+        ({"address": "auto"}, "a Ray address is of no use to the engine 'process'"),
+    ],
+)
+def test_settings_out_of_range__are_refused_before_anything_starts(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(ConfigError, match=message):
+        map_tasks(do, SQUARES, **options)
+
+
+def test_engine_ray__without_ray_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "ray", None)
+    with pytest.raises(ConfigError, match=r"the engine ray needs Ray; pip install -e '.\[cluster\]'"):
+        map_tasks(do, SQUARES, engine="ray")
+
+
+@needs_ray
+def test_ray__does_what_the_other_engines_do() -> None:
+    odd: list[Job] = [("fail", "bad"), ("exit", 7), ("variable", "AUTOPOLY_THREADS")]
+    found = results([*SQUARES, *odd], engine="ray", n_workers=2)
+    assert found.pop(("fail", "bad")).startswith("ValueError: bad (in odd_jobs.py")
+    assert found.pop(("exit", 7)).startswith("its worker died 2 times (")
+    assert found.pop(("variable", "AUTOPOLY_THREADS")) == "1"
+    assert found == {("square", x): x * x for x in range(20)}
+
+
+@needs_ray
+def test_ray_address__where_nobody_answers_is_one_line_soon(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert parallel.RAY_PATIENCE <= 13.0  # so that it is told within 15 seconds
+    monkeypatch.setattr(parallel, "RAY_PATIENCE", 3.0)
+    with socket.socket() as mute:  # takes connections and says nothing
+        mute.bind(("127.0.0.1", 0))
+        mute.listen()
+        address = f"127.0.0.1:{mute.getsockname()[1]}"
+        began = time.monotonic()
+        with pytest.raises(ConfigError, match=rf"no Ray cluster answers at '{address}' \(nothing within 3 seconds\)"):
+            map_tasks(do, SQUARES, engine="ray", address=address)
+    assert time.monotonic() - began < 5.0
+    with pytest.raises(ConfigError, match=r"no Ray cluster answers at 'auto' \(.*\); start one"):
+        map_tasks(do, SQUARES, engine="ray", address="auto")
