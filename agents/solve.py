@@ -2,7 +2,6 @@
 
 import errno
 import io
-import json
 import sys
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from agents.commands.running import FAILURE, complain, run_command
-from autopoly_env.errors import AutoPolyError, ConfigError
+from autopoly_env.errors import AutoPolyError
 
 DEFAULT_AGENT = "mcts"
 
@@ -141,16 +140,12 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _parse_options(given: list[str]) -> dict[str, Any]:
-    """`key=value` pairs; a value is read as JSON where it is that, else it is text."""
-    options = {}
+    """The options of the agent as they were typed, `key=value`."""
+    from agents.options import put_override
+
+    options: dict[str, Any] = {}
     for pair in given:
-        key, equals, value = pair.partition("=")
-        if not (key and equals):
-            raise ConfigError(f"--option {pair}: expected key=value, such as width=4")
-        try:
-            options[key] = json.loads(value)
-        except ValueError:
-            options[key] = value
+        put_override(options, pair, f"--option {pair}", "width=4")
     return options
 
 

@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-import yaml
 from pydantic import ConfigDict, Field
 
 from agents.base import Agent
 from agents.budget import Budget
-from agents.options import read_yaml
+from agents.options import put_override, read_yaml
 from agents.registry import AGENTS, make_agent
 from autopoly_env.errors import AutoPolyError, ConfigError
 from autopoly_env.score import ScoreWeights
@@ -166,7 +165,7 @@ def find_suite(given: str, overrides: Sequence[str] = ()) -> Suite:
             raise ConfigError(f"suite {given!r} is unknown; give one of {known}, a YAML file, or a folder of images")
     values = {"name": path.stem, **read_yaml(path, "a suite", may_be_empty=False)}
     for override in extra:
-        _apply(values, override)
+        put_override(values, override, f"--set {override}", "targets.n=10")
     return build_config(Suite, values, str(path) if path.parent != FOLDER else f"suite {path.stem}")
 
 
@@ -177,7 +176,7 @@ def with_budget(suite: Suite, text: str) -> Suite:
         if part.partition("=")[0] not in Budget.__dataclass_fields__:
             known = " or ".join(f"{name}=N" for name in Budget.__dataclass_fields__)
             raise ConfigError(f"--budget {text}: expected {known}")
-        _apply(values, part)
+        put_override(values, part, f"--budget {text}", "refits=500")
     budget = build_config(Budget, values, f"--budget {text}")
     return replace(suite, budget=budget, agents=tuple(replace(entry, budget=None) for entry in suite.agents))
 
@@ -200,20 +199,3 @@ def chosen(suite: Suite, names: Sequence[str]) -> tuple[Suite, set[str]]:
             raise ConfigError(f"agent {name!r} is unknown; give some of {', '.join(known)}")
         labels |= meant
     return suite, labels
-
-
-def _apply(values: dict[Any, Any], override: str) -> None:
-    """Put `section.key=value` into plain values; a value is YAML."""
-    path, equals, text = override.partition("=")
-    *sections, key = path.split(".")
-    try:
-        value = yaml.safe_load(text)
-    except (yaml.YAMLError, ValueError, RecursionError):
-        raise ConfigError(f"--set {override}: the value is not YAML; quote it or correct it") from None
-    for section in sections:
-        values = values.setdefault(section, {})
-        if not isinstance(values, dict):
-            raise ConfigError(f"--set {override}: {section!r} is no section; give such as targets.n=10")
-    if not (key and equals):
-        raise ConfigError(f"--set {override}: expected section.key=value, such as targets.n=10")
-    values[key] = value
