@@ -17,7 +17,7 @@ from autopoly_env.mesh import PolyMesh
 from autopoly_env.score import ScoreWeights
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator
-from tests.test_agents import simulator
+from tests.agents_helpers import simulator
 
 BOX = np.array([(0.2, 0.2), (0.8, 0.2), (0.8, 0.8), (0.2, 0.8)])
 
@@ -116,6 +116,17 @@ def test_tops__take_the_outline_of_a_mesh() -> None:
     tops = Tops(Hill(simulator("house")))
     place = tops.add_mesh(PolyMesh.grid(2, 0.2, 0.2, 0.8, 0.8))
     assert isinstance(place, Place) and len(place.outline.rings[0].points) == 8
+
+
+def test_tops__build_nothing_that_is_out_of_reach() -> None:
+    game = simulator("house", operators="paper", max_steps=1)
+    extruded = max(game.transition_all(game.initial()), key=lambda state: len(state.mesh.vertices)).mesh
+    assert extruded.counts == (6, 7, 2)  # one step, whose outline takes two
+    tops = Tops(Hill(game))
+    tops.add_mesh(extruded)
+    assert len(tops.built()) == 1
+    tops.add(tops.hill.place(outline(np.insert(BOX, 1, (0.5, 0.05), axis=0))))
+    assert len(tops.built()) == 2
 
 
 def hopped(seed: int, patience: int = 15, budget: Budget | None = None) -> list[float]:
