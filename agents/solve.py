@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from agents.commands.running import FAILURE, complain, run_command
+from agents.names import AGENT_NAMES
 from autopoly_env.errors import AutoPolyError
 
 DEFAULT_AGENT = "mcts"
@@ -20,6 +21,7 @@ Examples:
   python -m agents.solve examples
   python -m agents.solve chair.png mug.png --agent greedy --operators paper
   python -m agents.solve chair.png --agent beam --option width=4 --refits 5000
+  python -m agents.solve chair.png --agent my.module:MyAgent
   python -m agents.solve 'shapes/**/*.png' --json --quiet > scores.jsonl
   python -m agents.solve mug.png --importance face.png
   python -m agents.solve mug.png --agent beam --start mug.obj --lock 0,3
@@ -60,8 +62,8 @@ def solve(
     agent: Annotated[
         str,
         typer.Option(
-            help="Who builds: climb, trace, mcts, mcts_paper, nfap-prior, nfap-mcts, maskable-ppo, ppo, a2c, dqn, "
-            "rl-prior, decimate, beam, greedy, random, oracle, dr-simple or dr-complex."
+            help=f"Who builds: {', '.join(AGENT_NAMES)}, my.module:Agent for one of yours, or a YAML "
+            "file of options that is named after its agent (docs/agents.md)."
         ),
     ] = DEFAULT_AGENT,
     operators: Annotated[str, typer.Option(help="paper, full, or operators, separated by commas.")] = "full",
@@ -82,9 +84,11 @@ def solve(
         int | None,
         typer.Option(help="Limit of simulations an image, for agents that search a tree.", show_default="none"),
     ] = None,
-    seed: Annotated[int, typer.Option(help="Of the agents that draw random numbers.")] = 0,
+    seed: Annotated[
+        int | None, typer.Option(help="Of the agents that draw random numbers.", show_default="the agent's, 0")
+    ] = None,
     option: Annotated[
-        list[str] | None, typer.Option(metavar="KEY=VALUE", help="An option of the agent; may be repeated.")
+        list[str] | None, typer.Option(metavar="KEY=VALUE", help="An option of the agent, as YAML; may be repeated.")
     ] = None,
     importance: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Grey picture: white where matching matters, black where not.")
