@@ -1,6 +1,6 @@
 """What every agent promises, and how beam search goes about it, on trees drawn by hand."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -8,89 +8,30 @@ from typing import Any
 import numpy as np
 import pytest
 
-from agents.base import Agent, Decision
-from agents.baselines.beam import BeamAgent, BeamConfig
+from agents.base import Decision
 from agents.baselines.random_agent import RandomAgent, RandomConfig
 from agents.budget import Budget, Meter, Progress
 from agents.finish import finish
 from agents.registry import AGENTS, make_agent
-from agents.solution import Solution, Track
 from autopoly_env.errors import ConfigError
-from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import OPERATORS, STOP, Action
-from autopoly_env.score import Score, ScoreWeights, score
-from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.simulator import Simulator, State
-from tests.drawings import FRAME, HOUSE, ISLAND, L_SHAPE, SQUARE, TWO_SQUARES, noise, painted
+from tests.agents_helpers import (
+    TARGETS,
+    VALLEY,
+    VALLEY_CHILDREN,
+    Tree,
+    assert_consistent,
+    interrupt_at,
+    quick,
+    simulator,
+)
+from tests.drawings import SQUARE, noise, painted
 
 NAMES = ("random", "greedy", "beam", "trace", "climb")
-TARGETS = {
-    "house": painted(HOUSE),
-    "L": painted(L_SHAPE),
-    "frame": painted(FRAME),
-    "two squares": painted(TWO_SQUARES),
-    "island": painted(ISLAND),
-    "blobs": noise(3, 40),
-}
-
-
-def simulator(target: str = "house", **settings: Any) -> Simulator:
-    return Simulator(TARGETS[target], **{"resolution": 32, **settings})
-
-
-def quick(name: str) -> Agent:
-    """The agent with settings that keep a test short."""
-    options: dict[str, dict[str, Any]] = {
-        "beam": {"width": 2, "patience": 2},
-        "random": {"n_steps": 8},
-        "climb": {"n_rounds": 1},
-    }
-    return make_agent(name, **options.get(name, {}))
-
-
-def interrupt_at(call: int) -> Callable[[Progress], None]:
-    """Ctrl-C in the call-th report of progress, from 1."""
-    n_calls = iter(range(1, call + 1))
-
-    def report(_: Progress) -> None:
-        if next(n_calls) == call:
-            raise KeyboardInterrupt
-
-    return report
-
-
-def assert_consistent(solution: Solution, game: Simulator) -> None:
-    """The sequence builds the mesh bit for bit, is cut at its best, and the score is what the mesh is worth."""
-    sequence = ConstructionSequence.from_json(solution.sequence.to_json())
-    assert sequence.final() == solution.mesh
-    assert sequence.final().vertices.tobytes() == solution.mesh.vertices.tobytes()
-    silhouette = game.silhouette
-    assert solution.score == score(solution.mesh, silhouette.target(silhouette.resolution), game.weights)
-    scores = [sequence.start_score, *(step.score for step in sequence.steps)]
-    assert scores[-1] == solution.score.as_dict()
-    assert sequence.best_prefix() == sequence
-    assert [game.final_score(mesh).as_dict() for mesh in sequence.meshes()] == scores
-    assert sequence.settings == {**game.settings(), "scored_at": silhouette.resolution}
-    assert {step.operator for step in sequence.steps} <= set(game.operators)
-    assert len(sequence.steps) <= game.max_steps
 
 
 # --- every agent ---
-
-
-@pytest.mark.parametrize("operators", ["full", "paper"])
-@pytest.mark.parametrize("target", TARGETS)
-@pytest.mark.parametrize("name", NAMES)
-def test_solve__returns_what_its_sequence_builds(name: str, target: str, operators: str) -> None:
-    game = simulator(target, operators=operators)
-    assert_consistent(quick(name).solve(game), game)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_solve__keeps_to_the_step_limit(name: str) -> None:
-    for max_steps in (0, 1, 2):
-        game = simulator("island", max_steps=max_steps)
-        assert_consistent(quick(name).solve(game), game)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -98,14 +39,6 @@ def test_solve__takes_a_square_for_what_it_is(name: str) -> None:
     solution = quick(name).solve(Simulator(painted(SQUARE), resolution=64))
     assert (solution.mesh.counts, solution.score.iou, len(solution.sequence.steps)) == ((4, 4, 1), 1.0, 0)
     assert solution.stats.stopped_by == "finished"
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_solve__gives_the_same_twice(name: str) -> None:
-    agent, game = quick(name), simulator("island")
-    once, between, twice = agent.solve(game), agent.solve(simulator("house")), agent.solve(game)
-    assert once.sequence.to_json() == twice.sequence.to_json() == quick(name).solve(game).sequence.to_json()
-    assert between.sequence.to_json() != once.sequence.to_json()
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -213,48 +146,6 @@ def test_search__is_never_worse_than_the_rectangle_it_begins_with(name: str, tar
 def test_beam__builds_simple_shapes_perfectly(target: str, n_elements: tuple[int, int, int]) -> None:
     solution = make_agent("beam").solve(Simulator(TARGETS[target], resolution=64))
     assert (solution.mesh.counts, solution.score.iou) == (n_elements, 1.0)
-
-
-class Tree:
-    """A game drawn by hand: totals and children by name. `visited` are the nodes whose children were asked for."""
-
-    weights = ScoreWeights(w_sc=1.0)
-
-    def __init__(self, totals: dict[str, float], children: dict[str, str], twins: str = "", rich: str = "") -> None:
-        self.children = children
-        self.twins = twins  # nodes that are one shape
-        self.rich = rich  # nodes of complexity 15, the others have 9
-        self.states = {name: self._state(name, total) for name, total in totals.items()}
-        self.visited: list[str] = []
-
-    def _state(self, name: str, total: float) -> State:
-        place = 1 / (1 + "rabcdef".index(self.twins[0] if name in self.twins else name))
-        mesh = PolyMesh.rectangle(0.0, 0.0, place, place)
-        complexity = 15 if name in self.rich else 9
-        return State(mesh, Score(total / 100, complexity, 0, total), n_refits=1, action=Action(name, 0))
-
-    def name(self, state: State) -> str:
-        assert state.action is not None
-        return state.action.operator
-
-    def transition_all(self, state: State) -> list[State]:
-        self.visited.append(self.name(state))
-        return [self.states[child] for child in self.children.get(self.name(state), "")]
-
-    def search(self, budget: Budget | None = None, **options: Any) -> tuple[str, str]:
-        """(the nodes visited, the best node) of a beam search from node r."""
-        agent, root = BeamAgent(BeamConfig(**options)), Track(self.states["r"])
-        found = [root, *agent._search(self, root, Meter(budget or Budget()))]  # type: ignore[arg-type]
-        best = max(found, key=lambda track: track.state.score.total)
-        assert self.name(best.states()[0]) == "r"
-        return "".join(self.visited), self.name(best.state)
-
-
-#            r 10
-#       a 20      b 15      c 5
-#       d 12      e 30      f 90
-VALLEY = {"r": 10.0, "a": 20.0, "b": 15.0, "c": 5.0, "d": 12.0, "e": 30.0, "f": 90.0}
-VALLEY_CHILDREN = {"r": "cab", "a": "d", "b": "e", "c": "f"}
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from autopoly_env.refit import refit_kernels
 from benchmarks import search, search_cases, search_rows
 from benchmarks.curve_picture import draw_curves
 from benchmarks.search_cases import Case, Found, Records, Results, best_of_plays, made, target_of
-from tests.test_agents import simulator
+from tests.agents_helpers import simulator
 from training.report.statistics import Interval
 
 DOCS = Path(__file__).parent.parent / "docs" / "search.md"

@@ -13,8 +13,8 @@ from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh, defects_of
 from autopoly_env.operators import STOP
 from autopoly_env.simulator import Simulator
+from tests.agents_helpers import TARGETS, assert_consistent, interrupt_at, simulator
 from tests.drawings import L_SHAPE, SQUARE, TWO_SQUARES, noise, painted
-from tests.test_agents import TARGETS, assert_consistent, interrupt_at, simulator
 
 TRAPEZIUM = shapely.Polygon([(0.4, 0.2), (0.6, 0.2), (0.8, 0.8), (0.2, 0.8)])
 

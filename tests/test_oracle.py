@@ -13,8 +13,8 @@ from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import is_sane
 from autopoly_env.operators import STOP
 from autopoly_env.simulator import Simulator, State
+from tests.agents_helpers import TARGETS, VALLEY, VALLEY_CHILDREN, Tree, assert_consistent, interrupt_at, simulator
 from tests.drawings import HOUSE, SQUARE, painted
-from tests.test_agents import TARGETS, VALLEY, VALLEY_CHILDREN, Tree, assert_consistent, interrupt_at, simulator
 
 
 def played(tree: Tree, **options: Any) -> tuple[str, str]:
