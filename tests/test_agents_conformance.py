@@ -41,7 +41,7 @@ def options(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any
 @pytest.mark.parametrize("operators", ["full", "paper"])
 @pytest.mark.parametrize("name", [name for name in AGENTS if name not in WITH_NETWORKS])
 def test_agent__conforms(name: str, operators: str) -> None:
-    options = {"mcts": {"hop_patience": 3}}.get(name, {})
+    options = {"mcts": {"n_simulations": 2, "hop_patience": 1}}.get(name, {})
     agent, other = (quick(name, **options) for _ in range(2))
     shapes = [TARGETS["island"], TARGETS["blobs"]]
     check_agent(agent, shapes, reports_a_step=2 if name == "mcts_paper" else 1, operators=operators)
