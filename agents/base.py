@@ -3,11 +3,12 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
 from agents.budget import Budget, Meter, Progress
 from agents.finish import finish
 from agents.solution import Solution, Track
-from autopoly_env.errors import ConfigError
+from autopoly_env.errors import ConfigError, ConformanceError
 from autopoly_env.operators import STOP, Action
 from autopoly_env.simulator import Simulator, State
 
@@ -25,6 +26,7 @@ class Agent(ABC):
     """Chooses actions. `solve` plays them out; an agent that does not play step by step overrides it instead."""
 
     name = "agent"
+    config_class: ClassVar[type[Any] | None] = None  # a dataclass, all with defaults, that __init__ takes one of
     runs_simulations = False  # what a budget may limit
     takes_guidance = True  # a start mesh, locked vertices and symmetry, which the transitions it plays keep to
 
@@ -57,10 +59,17 @@ class Agent(ABC):
     def _search(self, simulator: Simulator, track: Track, meter: Meter) -> Iterator[Track]:
         """Play from `track` on until it is over or the budget is spent; yield what might be the best so far."""
         while not track.state.done and not meter.spent():
-            state = simulator.transition(track.state, self.act(simulator, track.state).action)
+            state = simulator.transition(track.state, self._decided(simulator, track.state).action)
             meter.add([state])
             track = Track(state, track)
             yield track
+
+    def _decided(self, simulator: Simulator, state: State) -> Decision:
+        """What `act` decides. Raises ConformanceError where that is no decision."""
+        decision: Any = self.act(simulator, state)
+        if isinstance(decision, Decision) and isinstance(decision.action, Action):
+            return decision
+        raise ConformanceError(f"{full_name(self)}: act returned {decision!r:.60}; expected a Decision with an Action")
 
 
 class WholeAgent(Agent):
@@ -85,6 +94,11 @@ class WholeAgent(Agent):
     @abstractmethod
     def _find(self, simulator: Simulator, meter: Meter) -> Solution:
         """As `solve`, within what `meter` allows."""
+
+
+def full_name(agent: Agent) -> str:
+    """The agent's class and the module that it is in, as in my.module:MyAgent."""
+    return f"{type(agent).__module__}:{type(agent).__qualname__}"
 
 
 def check_guidance(agent: Agent, names: Sequence[str]) -> None:

@@ -7,33 +7,40 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from agents.commands.operators import OutsideOperators, know
 from agents.commands.running import FAILURE, complain, run_command
-from autopoly_env.errors import ConfigError, OutputError, SequenceError
+from autopoly_env.errors import AutoPolyError, ConfigError, OutputError, SequenceError
+from autopoly_env.export.formats import LISTED, Export, Format, find_format, format_of, formats
+from autopoly_env.outside import described
 
 if TYPE_CHECKING:
     from autopoly_env.sequence import ConstructionSequence
 
-HELP = """Write construction sequences in another format.
+DEFAULT = "html"
+
+_FORMATS = "\n".join(f"  {name:8} {line}" for name, _, line in LISTED)
+
+HELP = f"""Write construction sequences in another format.
 
 \b
 Examples:
   python -m agents.export out/chair/sequence.json
   python -m agents.export out/mug/sequence.json --target mug.png --out mug.html
+  python -m agents.export out/chair/sequence.json --out chair.obj
   python -m agents.export out/chair/sequence.json --to svg --step 4
   python -m agents.export out/*/sequence.json --to gltf --depth 0.1 --out glTF
 
 \b
 Formats:
-  html     the player: a page to watch, with what to press in Blender
-  svg      a drawing to edit, a layer for each step, the last one visible
-  obj      the last mesh, with its n-gons
-  gltf     an animation for viewers and engines; binary in a file .glb
-  gif      an animated picture
-  png      every step on one sheet
-  blender  a Python script that builds the mesh with Blender's own operators
+{_FORMATS}
 
-Without --out the result goes beside the sequence, under its name. What does not
-replay is not written: one line tells the step, its operator and the reason.
+\b
+Without --to the ending of --out decides. A format of your own is named by its
+module, --to my.module:FORMAT (docs/player.md).
+
+\b
+Without --out the result goes beside the sequence, under its name. What does
+not replay is not written: one line tells the step, its operator and the reason.
 
 Exit codes: 0 all is well, 1 something failed, 2 wrong usage, 130 Ctrl-C.
 """
@@ -46,7 +53,13 @@ def export(
     sequences: Annotated[
         list[Path], typer.Argument(metavar="SEQUENCE", help="Sequences as agents.solve writes them (JSON).")
     ],
-    to: Annotated[str, typer.Option(help="html, svg, obj, gltf, gif, png or blender.")] = "html",
+    to: Annotated[
+        str | None,
+        typer.Option(
+            help=f"{', '.join(name for name, _, _ in LISTED)}, or my.module:FORMAT.",
+            show_default="what --out ends in, or html",
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(help="A file name with its ending, or a folder.", show_default="beside the sequence"),
@@ -59,30 +72,34 @@ def export(
         int | None, typer.Option(help="End the construction after this step; 0 is the start.", show_default="the last")
     ] = None,
     depth: Annotated[
-        float, typer.Option(help="Thickness of the mesh, in units of the unit square (gltf, blender).")
+        float, typer.Option(help="Thickness of the mesh, in units of the unit square, in formats that show it.")
     ] = 0.0,
+    operators: OutsideOperators = None,
 ) -> int:
     """Check the options, then write one sequence after the other; return the exit code."""
-    from autopoly_env.export.formats import FORMATS, Export
     from autopoly_env.silhouette import load_silhouette
 
-    if to not in FORMATS:
-        raise ConfigError(f"--to {to}: unknown format; give one of {', '.join(FORMATS)}")
-    kind = FORMATS[to]
-    if depth and not kind.shows_depth:
-        able = [name for name, other in FORMATS.items() if other.shows_depth]
-        raise ConfigError(f"--depth {depth}: {to} is flat; use it with {', '.join(able)}")
-    if target and not kind.shows_target:
-        able = [name for name, other in FORMATS.items() if other.shows_target]
-        raise ConfigError(f"--target {target}: {to} shows no target; use it with {', '.join(able)}")
-    jobs = list(_name_outputs(list(dict.fromkeys(sequences)), out, kind.suffix))
+    sources = list(dict.fromkeys(sequences))
+    if out is not None and out.resolve() in {source.resolve() for source in sources}:
+        raise ConfigError(f"{out}: is a sequence; give another --out")
+    know(operators)
+    made = _choose(to, out, len(sources))
+    if depth and not made.shows_depth:
+        able = [name for name, other in formats().items() if other.shows_depth]
+        raise ConfigError(f"--depth {depth}: {made.name} is flat; use it with {', '.join(able)}")
+    if target and not made.shows_target:
+        able = [name for name, other in formats().items() if other.shows_target]
+        raise ConfigError(f"--target {target}: {made.name} shows no target; use it with {', '.join(able)}")
+    jobs = list(_name_outputs(sources, out, made.suffix))
     silhouette = load_silhouette(target) if target else None
     n_failed = 0
     for source, goal in jobs:
         try:
-            sequence = _load(source, step)
-            print(kind.write(Export(sequence, silhouette, depth), goal))
-        except (OutputError, SequenceError) as error:
+            _write(made, Export(_load(source, step), silhouette, depth), goal)
+            print(goal)
+        except ConfigError:
+            raise
+        except AutoPolyError as error:
             complain(str(error) if str(source) in str(error) else f"{source}: {error}", FAILURE)
             n_failed += 1
     return FAILURE if n_failed else 0
@@ -91,6 +108,36 @@ def export(
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; whatever is wrong is told in one line on stderr. Returns the exit code."""
     return run_command(app, arguments, "python -m agents.export")
+
+
+def _choose(to: str | None, out: Path | None, n: int) -> Format:
+    """The format of `n` sequences: by its name, or by the ending of --out. Raises ConfigError if they contradict."""
+    named = None if to is None else find_format(to)
+    if out is None or not out.suffix or out.is_dir():
+        return named or find_format(DEFAULT)
+    if n > 1:  # to go into a folder, which may have a dot in its name
+        if out.suffix.lower() in {suffix for other in formats().values() for suffix in other.suffixes}:
+            raise ConfigError(f"--out {out}: one file for {n} sequences; give a folder")
+        return named or find_format(DEFAULT)
+    if named is None:
+        return format_of(out)
+    if out.suffix.lower() not in named.suffixes:
+        endings = " or ".join(named.suffixes)
+        raise ConfigError(f"--out {out} with --to {to}: expected a file name that ends in {endings}; leave one out")
+    return named
+
+
+def _write(made: Format, export: Export, goal: Path) -> None:
+    """Write a file. Raises OutputError, in one line that names the format, for whatever a writer may do."""
+    try:
+        made.write(export, goal)
+    except (ConfigError, OutputError, SequenceError):
+        raise
+    except Exception as error:  # whatever it is, the other sequences can be written
+        what = described(error, str(getattr(made.write, "__module__", "")))
+        raise OutputError(f"{goal}: the writer of {made.name} failed: {what}") from error
+    if not goal.exists():
+        raise OutputError(f"{goal}: the writer of {made.name} made no such file")
 
 
 def _load(path: Path, step: int | None) -> "ConstructionSequence":

@@ -1,5 +1,6 @@
-"""Options from outside: YAML files, and values that are checked against a config dataclass."""
+"""Options from outside: YAML files, `key=value` on the command line, and values checked against a config dataclass."""
 
+import json
 import os
 from pathlib import Path
 from typing import Any, TypeVar
@@ -31,6 +32,39 @@ def read_yaml(path: str | os.PathLike[str], of: str = "options", *, may_be_empty
     if not isinstance(options, dict):
         raise ConfigError(f"{path}: holds a {type(options).__name__}; write one 'option: value' a line")
     return options
+
+
+def put_override(values: dict[Any, Any], text: str, where: str, example: str) -> None:
+    """Put "key=value" or "section.key=value" into plain values, sections made where there are none.
+
+    A value is YAML, such as 4, 1e-3, [trace] or text, in which JSON means what it means as JSON. Raises ConfigError,
+    which begins with `where` the text comes from and gives an `example`, for what is none of that.
+
+    >>> values = {"net": {"n": 3}}
+    >>> put_override(values, "net.inputs=[a, b]", "--set net.inputs=[a, b]", "net.n=4")
+    >>> values
+    {'net': {'n': 3, 'inputs': ['a', 'b']}}
+    """
+    path, equals, written = text.partition("=")
+    if not (path and equals):
+        raise ConfigError(f"{where}: expected key=value, such as {example}")
+    *sections, key = path.split(".")
+    for section in sections:
+        values = values.setdefault(section, {})
+        if not isinstance(values, dict):
+            raise ConfigError(f"{where}: {section!r} is no section; give such as {example}")
+    values[key] = _value(written, where)
+
+
+def _value(written: str, where: str) -> Any:
+    try:
+        return json.loads(written)  # first, for YAML 1.1 takes 1e-3 for text
+    except (ValueError, RecursionError):
+        pass
+    try:
+        return yaml.safe_load(written)
+    except (yaml.YAMLError, ValueError, RecursionError):
+        raise ConfigError(f"{where}: the value is not YAML; quote it or correct it") from None
 
 
 def validated(kind: type[_Config], values: dict[str, Any], what: str = "") -> _Config:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from agents.commands.operators import OutsideOperators, know
 from agents.commands.running import INTERRUPTED, run_command
 from autopoly_env.errors import ConfigError, SequenceError
 
@@ -47,6 +48,7 @@ def retarget(
     image: Annotated[Path, typer.Argument(metavar="NEW_IMAGE", help="The silhouette to build instead.")],
     refits: Annotated[int, typer.Option(help="Limit of refits.")] = 300,
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out"),
+    operators: OutsideOperators = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print a JSON record, no table.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar, no notes.")] = False,
 ) -> int:
@@ -61,6 +63,7 @@ def retarget(
     from autopoly_env.silhouette import load_silhouette
 
     budget = Budget(refits=refits)
+    know(operators)
     sequence = ConstructionSequence.load(source)
     [job] = name_jobs([image], out)
     silhouette = load_silhouette(image, name=job.name)

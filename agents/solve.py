@@ -2,7 +2,6 @@
 
 import errno
 import io
-import json
 import sys
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,7 +9,8 @@ from typing import Annotated, Any
 import typer
 
 from agents.commands.running import FAILURE, complain, run_command
-from autopoly_env.errors import AutoPolyError, ConfigError
+from agents.names import AGENT_NAMES
+from autopoly_env.errors import AutoPolyError
 
 DEFAULT_AGENT = "mcts"
 
@@ -21,6 +21,7 @@ Examples:
   python -m agents.solve examples
   python -m agents.solve chair.png mug.png --agent greedy --operators paper
   python -m agents.solve chair.png --agent beam --option width=4 --refits 5000
+  python -m agents.solve chair.png --agent my.module:MyAgent
   python -m agents.solve 'shapes/**/*.png' --json --quiet > scores.jsonl
   python -m agents.solve mug.png --importance face.png
   python -m agents.solve mug.png --agent beam --start mug.obj --lock 0,3
@@ -62,11 +63,13 @@ def solve(
     agent: Annotated[
         str,
         typer.Option(
-            help="Who builds: climb, trace, mcts, mcts_paper, nfap-prior, nfap-mcts, maskable-ppo, ppo, a2c, dqn, "
-            "rl-prior, decimate, beam, greedy, random, oracle, dr-simple or dr-complex."
+            help=f"Who builds: {', '.join(AGENT_NAMES)}, my.module:Agent for one of yours, or a YAML "
+            "file of options that is named after its agent (docs/agents.md)."
         ),
     ] = DEFAULT_AGENT,
-    operators: Annotated[str, typer.Option(help="paper, full, or operators, separated by commas.")] = "full",
+    operators: Annotated[
+        str, typer.Option(help="paper, full, names, or my.module:my_operator, separated by commas.")
+    ] = "full",
     w_sm: Annotated[float, typer.Option(help="Weight of the IoU.")] = 100.0,
     w_sc: Annotated[float, typer.Option(help="Weight of the complexity V + E + F.")] = 0.3,
     w_si: Annotated[float, typer.Option(help="Weight of the self-intersections.")] = 5.0,
@@ -84,9 +87,11 @@ def solve(
         int | None,
         typer.Option(help="Limit of simulations an image, for agents that search a tree.", show_default="none"),
     ] = None,
-    seed: Annotated[int, typer.Option(help="Of the agents that draw random numbers.")] = 0,
+    seed: Annotated[
+        int | None, typer.Option(help="Of the agents that draw random numbers.", show_default="the agent's, 0")
+    ] = None,
     option: Annotated[
-        list[str] | None, typer.Option(metavar="KEY=VALUE", help="An option of the agent; may be repeated.")
+        list[str] | None, typer.Option(metavar="KEY=VALUE", help="An option of the agent, as YAML; may be repeated.")
     ] = None,
     importance: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Grey picture: white where matching matters, black where not.")
@@ -142,16 +147,12 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _parse_options(given: list[str]) -> dict[str, Any]:
-    """`key=value` pairs; a value is read as JSON where it is that, else it is text."""
-    options = {}
+    """The options of the agent as they were typed, `key=value`."""
+    from agents.options import put_override
+
+    options: dict[str, Any] = {}
     for pair in given:
-        key, equals, value = pair.partition("=")
-        if not (key and equals):
-            raise ConfigError(f"--option {pair}: expected key=value, such as width=4")
-        try:
-            options[key] = json.loads(value)
-        except ValueError:
-            options[key] = value
+        put_override(options, pair, f"--option {pair}", "width=4")
     return options
 
 

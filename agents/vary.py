@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from agents.commands.operators import OutsideOperators, know
 from agents.commands.running import INTERRUPTED, run_command
 from autopoly_env.errors import ConfigError, SequenceError
 
 if TYPE_CHECKING:
-    from rich.progress import Progress
-
     from agents.commands.ctrl_c import CtrlC
     from agents.retell.variants import Variant
     from autopoly_env.arrays import ByteArray
@@ -49,15 +48,18 @@ def vary(
     amount: Annotated[float, typer.Option(help="How far an edit pulls, in the unit square.")] = 0.12,
     seed: Annotated[int, typer.Option(help="Of the random numbers.")] = 0,
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/variants"),
+    operators: OutsideOperators = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar, no notes.")] = False,
 ) -> int:
     """Check the options, then draw and write one variant after the other; return the exit code."""
     from agents.commands.ctrl_c import CtrlC
+    from agents.commands.progress import TASK, progress_bar
     from agents.commands.results import claim_folder
     from agents.retell.variants import check_sound, draw_variants
     from autopoly_env.sequence import ConstructionSequence
 
     _check(n, amount, seed)
+    know(operators)
     sequence = ConstructionSequence.load(source)
     try:
         check_sound(sequence)
@@ -65,8 +67,7 @@ def vary(
         raise SequenceError(f"{source}: {error}") from None
     claim_folder(out)
     cells, n_failed = [_cell(sequence.final(), "as it was\n")], 0
-    with CtrlC() as ctrl_c, _bar(quiet) as bar:
-        task = bar.add_task("variants", total=n)
+    with CtrlC() as ctrl_c, progress_bar(n, "variants", is_hidden=quiet) as bar:
         for number, variant in enumerate(draw_variants(sequence, n, amount, seed), 1):
             if variant is None:
                 n_failed += 1
@@ -76,7 +77,7 @@ def vary(
                 except KeyboardInterrupt:  # the second
                     return INTERRUPTED
                 cells.append(_cell(variant.sequence.final(), f"variant-{number}\nedited after step {variant.step}"))
-            bar.advance(task)
+            bar.advance(TASK)
             if ctrl_c.n_pressed:
                 break
         print(f"{len(cells) - 1} variants\nOpen {_save_sheet(cells, out / SHEET)}")
@@ -97,14 +98,6 @@ def _check(n: int, amount: float, seed: int) -> None:
         raise ConfigError(f"--amount {amount}: expected a length in the unit square, above 0, at most 1")
     if seed < 0:
         raise ConfigError(f"--seed {seed}: expected at least 0")
-
-
-def _bar(quiet: bool) -> "Progress":
-    from rich.console import Console
-    from rich.progress import Progress
-
-    console = Console(stderr=True)
-    return Progress(console=console, disable=quiet or not console.is_terminal, transient=True, redirect_stdout=False)
 
 
 def _write(variant: "Variant", folder: Path, ctrl_c: "CtrlC") -> None:
@@ -129,20 +122,10 @@ def _cell(mesh: "PolyMesh", caption: str) -> "ByteArray":
 
 def _save_sheet(cells: "Sequence[ByteArray]", path: Path) -> Path:
     """Write all cells on one page, about as wide as high."""
-    import numpy as np
-    from PIL import Image
-
+    from agents.commands.results import page_of
     from autopoly_env.export import save_png
-    from autopoly_env.viewer import PAPER
 
-    height, width, _ = cells[0].shape
-    n_columns = math.ceil(len(cells) ** 0.5)
-    n_rows = math.ceil(len(cells) / n_columns)
-    page = np.full((n_rows * height, n_columns * width, 3), PAPER, np.uint8)
-    for i, cell in enumerate(cells):
-        row, column = divmod(i, n_columns)
-        page[row * height : (row + 1) * height, column * width : (column + 1) * width] = cell
-    return save_png(Image.fromarray(page), path)
+    return save_png(page_of(cells, math.ceil(len(cells) ** 0.5)), path)
 
 
 if __name__ == "__main__":

@@ -93,6 +93,13 @@ class Simulator:
         self.finest = min(self.silhouette.resolution, POLISH_RESOLUTION)  # pixels a side at which meshes are finished
         self._refit_targets: dict[tuple[int, float], RefitTarget] = {}
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "operators": preset(self.operators)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Make the operators known to this process, too."""
+        vars(self).update(state, operators=tuple(operator.name for operator in preset(state["operators"])))
+
     def refit_target(self, iou: float, resolution: int | None = None) -> RefitTarget:
         """What a mesh of that IoU is refitted to, at the simulator's resolution or another one.
 

@@ -230,7 +230,7 @@ def _interval(mean: Interval, n: int) -> str:
 
 
 def _is_default(name: str, value: Any) -> bool:
-    _, default = AGENTS["mcts"]
+    default = AGENTS["mcts"].default
     assert isinstance(default, MctsConfig)
     return bool(asdict(default)[name] == value)
 

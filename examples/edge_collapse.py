@@ -62,11 +62,12 @@ def on_boundary(mesh: PolyMesh, edge: int) -> bool:
 
 def mirror(of: Mirroring, start: Start) -> Iterator[Start]:
     """The opposite edge collapsed, too; an edge that is its own image goes to a point on the axis."""
-    ends = mesh_ids(of.mesh, of.images[of.mesh.edges[of.action.element]].tolist())
-    if set(ends) == set(mesh_ids(of.mesh, of.mesh.edges[of.action.element].tolist())):
+    ends = of.mesh.edges[of.action.element].tolist()
+    images = of.images[ends].tolist()  # -1 for an end inside the mesh, which has none
+    if set(images) == set(ends):
         yield start
-    elif set(ends) <= set(start.mesh.vertex_ids):
-        edge = start.mesh.edge_index(*(start.mesh.vertex_index(name) for name in ends))
+    elif -1 not in images and not set(images) & set(ends):  # two edges of one corner cannot both be collapsed to theirs
+        edge = start.mesh.edge_index(*map(start.mesh.vertex_index, mesh_ids(of.mesh, images)))
         second, halfway = again(edge_collapse, start.mesh, edge)
         yield Start(None, second, halfway)
 

@@ -46,7 +46,11 @@ app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_mar
 def evaluate(
     suite: Annotated[list[str], typer.Argument(metavar="SUITE|DIR", help="With --merge: the folders of runs.")],
     agents: Annotated[
-        str | None, typer.Option(help="Labels or agents, separated by commas.", show_default="all of the suite")
+        str | None,
+        typer.Option(
+            help="Labels or agents (my.module:Agent for one of yours), separated by commas.",
+            show_default="all of the suite",
+        ),
     ] = None,
     budget: Annotated[
         str | None, typer.Option(metavar="refits=N|seconds=S", help="For every agent.", show_default="the suite's")

@@ -7,9 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TypeVar
 
-import yaml
-
-from agents.options import read_yaml, validated
+from agents.options import put_override, read_yaml, validated
 from autopoly_env.errors import ConfigError, RunError
 
 _Config = TypeVar("_Config")
@@ -25,12 +23,8 @@ def read_config(path: str | os.PathLike[str] | None, overrides: list[str], defau
     if path is not None:
         _merge(values, read_yaml(path), str(path))
     for override in overrides:
-        key, equals, text = override.partition("=")
-        if not (key and equals):
-            raise ConfigError(f"override {override!r}: expected section.key=value, such as optim.lr=1e-3")
-        nested: Any = _value(override, text)
-        for part in reversed(key.split(".")):
-            nested = {part: nested}
+        nested: dict[Any, Any] = {}
+        put_override(nested, override, f"override {override!r}", "optim.lr=1e-3")
         _merge(values, nested, f"override {override!r}")
     return build_config(type(default), values, "the config" if path is None else str(path))
 
@@ -81,10 +75,3 @@ def _merge(values: dict[str, Any], given: dict[Any, Any], where: str) -> None:
             _merge(values[key], value, where)
         else:
             raise ConfigError(f"{where}: {key!r} is a section; give one of its options: {', '.join(values[key])}")
-
-
-def _value(override: str, text: str) -> Any:
-    try:
-        return yaml.safe_load(text)
-    except (yaml.YAMLError, ValueError, RecursionError):
-        raise ConfigError(f"override {override!r}: the value is not YAML; quote it or correct it") from None

@@ -14,7 +14,7 @@ from autopoly_env.simulator import Simulator, State
 
 @dataclass(frozen=True)
 class BeamConfig:
-    """How `beam` searches; `greedy` is a beam of width 1."""
+    """How `beam` searches."""
 
     width: int = 8
     patience: int = 4  # steps in a row that may fail to improve the best score
@@ -32,6 +32,7 @@ class BeamAgent(Agent):
     """Beam search over whole transitions: every legal action of every kept shape, refitted and scored."""
 
     name = "beam"
+    config_class = BeamConfig
 
     def __init__(self, config: BeamConfig) -> None:
         self._config = config
@@ -75,3 +76,17 @@ class BeamAgent(Agent):
             if len(chosen) == self._config.width:
                 break
         return list(chosen.values())
+
+
+@dataclass(frozen=True)
+class GreedyConfig(BeamConfig):
+    """How `greedy` searches."""
+
+    width: int = 1
+
+
+class GreedyAgent(BeamAgent):
+    """A beam of width 1."""
+
+    name = "greedy"
+    config_class = GreedyConfig

@@ -36,6 +36,7 @@ class OracleAgent(Agent):
     """The best of beams up to a large width, or of a search that leaves nothing out."""
 
     name = "oracle"
+    config_class = OracleConfig
 
     def __init__(self, config: OracleConfig) -> None:
         self._config = config

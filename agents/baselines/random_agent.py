@@ -26,6 +26,7 @@ class RandomAgent(Agent):
     """Draws an operator, then one of its legal elements, so that operators with many elements are not favoured."""
 
     name = "random"
+    config_class = RandomConfig
 
     def __init__(self, config: RandomConfig) -> None:
         self._config = config

@@ -37,6 +37,7 @@ class ClimbAgent(WholeAgent):
     """Traces and searches greedily, then climbs from each result; returns the best."""
 
     name = "climb"
+    config_class = ClimbConfig
 
     def __init__(self, config: ClimbConfig) -> None:
         self._config = config

@@ -46,6 +46,7 @@ class DecimateAgent(WholeAgent):
     """Decimates fine traces; returns the best outline on the way that has few enough vertices."""
 
     name = "decimate"
+    config_class = DecimateConfig
 
     def __init__(self, config: DecimateConfig) -> None:
         self._config = config

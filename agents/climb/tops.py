@@ -38,8 +38,12 @@ class Tops:
         return list(self._places)
 
     def built(self) -> list[State]:
-        """The construction of the best place, as they are when they are polished."""
+        """The construction of the best place within reach, as they are when they are polished.
+
+        The outline of a mesh may be out of it: an extrusion is one step, and its outline two subdivisions.
+        """
         refined = sorted(map_threads(self.hill.refined, self._places), key=total_of, reverse=True)
         polished = sorted(map_threads(self.hill.polished, refined[:_N_POLISHED]), key=total_of, reverse=True)
         places = [*polished, *refined[_N_POLISHED:]]
-        return build_best(self.hill.simulator, [place.outline for place in places], _N_BUILT)
+        outlines = [place.outline for place in places if self.hill.reach.allows(place.outline)]
+        return build_best(self.hill.simulator, outlines, _N_BUILT)

@@ -6,11 +6,11 @@ from typing import Any
 
 from rich import box
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
 
 from agents import budget
+from agents.commands.progress import TASK, progress_bar
 from agents.commands.results import Result
 from autopoly_env.sequence import Lesson
 
@@ -37,19 +37,8 @@ class Report:
         self._output = Console()
         if not self._output.is_terminal:
             self._output.width = PLAIN_WIDTH
-        is_seen = self._messages.is_terminal and not quiet and not (as_json and self._output.is_terminal)
-        self._bar = Progress(
-            SpinnerColumn(),
-            MofNCompleteColumn(),
-            BarColumn(bar_width=24),
-            TimeElapsedColumn(),
-            TextColumn("{task.description}", markup=False),
-            console=self._messages,
-            disable=not is_seen,
-            redirect_stdout=False,
-            transient=True,
-        )
-        self._task = self._bar.add_task("", total=n_tasks)
+        is_hidden = quiet or (as_json and self._output.is_terminal)
+        self._bar = progress_bar(n_tasks, is_hidden=is_hidden, console=self._messages)
         self._name = ""
 
     def __enter__(self) -> "Report":
@@ -62,18 +51,18 @@ class Report:
     def begin(self, name: str) -> None:
         """An image is begun."""
         self._name = name
-        self._bar.update(self._task, description=name)
+        self._bar.update(TASK, description=name)
 
     def progress(self, progress: budget.Progress) -> None:
         """An agent has come this far with it."""
         text = f"{self._name}  r_all {progress.best_total:.2f}, {progress.n_refits} refits"
         if progress.n_nodes:
             text += f", tree of {progress.n_nodes}"
-        self._bar.update(self._task, description=text)
+        self._bar.update(TASK, description=text)
 
     def solved(self, result: Result) -> None:
         """An image is solved and its results are written."""
-        self._bar.advance(self._task)
+        self._bar.advance(TASK)
         self._picture = result.files["steps.png"]
         if self._as_json:
             _print_record(record_of(result))
@@ -88,7 +77,7 @@ class Report:
         """Something, most often an image, has failed."""
         self.n_failed += 1
         problem = " ".join(problem.split())
-        self._bar.advance(self._task)
+        self._bar.advance(TASK)
         if self._as_json:
             _print_record({"image": what, "error": problem})
         self.say(f"error: {problem}" if what in problem else f"error: {what}: {problem}")

@@ -4,7 +4,7 @@ import math
 import os
 import shutil
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
@@ -91,11 +91,15 @@ class Overview:
 
     def page(self) -> Image.Image:
         """The page, at least one mesh on it."""
-        height, width, _ = self._cells[0].shape
-        n_columns = min(self._n_columns, len(self._cells))
-        n_rows = math.ceil(len(self._cells) / n_columns)
-        page = np.full((n_rows * height, n_columns * width, 3), viewer.PAPER, np.uint8)
-        for i, cell in enumerate(self._cells):
-            row, column = divmod(i, n_columns)
-            page[row * height : (row + 1) * height, column * width : (column + 1) * width] = cell
-        return Image.fromarray(page)
+        return page_of(self._cells, min(self._n_columns, len(self._cells)))
+
+
+def page_of(cells: Sequence[ByteArray], n_columns: int) -> Image.Image:
+    """Pictures (H, W, 3), all of one size and at least one, on one page, row by row."""
+    height, width, _ = cells[0].shape
+    n_rows = math.ceil(len(cells) / n_columns)
+    page = np.full((n_rows * height, n_columns * width, 3), viewer.PAPER, np.uint8)
+    for i, cell in enumerate(cells):
+        row, column = divmod(i, n_columns)
+        page[row * height : (row + 1) * height, column * width : (column + 1) * width] = cell
+    return Image.fromarray(page)

@@ -1,9 +1,9 @@
 """The work behind `agents.solve`: one image after the other, each whole or not at all, until done or Ctrl-C."""
 
-import traceback
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +15,13 @@ from agents.commands.ctrl_c import CtrlC
 from agents.commands.report import Report
 from agents.commands.results import OVERVIEW, RESULTS, Overview, Result, write_results
 from agents.commands.wishes import NO_WISHES, Wishes
-from agents.registry import AGENTS, make_agent
+from agents.contract import solved
+from agents.entry import AgentEntry
+from agents.registry import find_agent
 from autopoly_env.compute import n_threads
 from autopoly_env.errors import AutoPolyError, ConfigError
 from autopoly_env.export import save_png
+from autopoly_env.outside import described
 from autopoly_env.score import ScoreWeights
 from autopoly_env.silhouette import Silhouette, load_silhouette
 from autopoly_env.simulator import Simulator
@@ -30,7 +33,7 @@ class Settings:
 
     agent: str
     options: dict[str, Any]
-    seed: int  # for agents that have such an option, unless `options` has it
+    seed: int | None  # for agents that have such an option, unless `options` has it
     operators: str
     resolution: int
     max_steps: int
@@ -53,9 +56,8 @@ class Settings:
 
     def new_agent(self) -> Agent:
         """A fresh one for every image, so that no result depends on the images before it."""
-        takes_seed = self.agent in AGENTS and "seed" in AGENTS[self.agent][1].__dataclass_fields__
-        options = {"seed": self.seed, **self.options} if takes_seed else self.options
-        return make_agent(self.agent, **options)
+        seed = {"seed": self._seed} if "seed" in self._entry.options else {}
+        return self._entry.agent(**(self._options | seed))
 
     def simulator(self, silhouette: Silhouette) -> Simulator:
         """The rules, for one target."""
@@ -70,9 +72,25 @@ class Settings:
 
     def as_dict(self) -> dict[str, Any]:
         """What a construction sequence keeps beside the simulator's settings."""
-        seed = self.options.get("seed", self.seed)
-        settings = {"agent": self.agent, "options": self.options, "seed": seed, "budget": asdict(self.budget)}
+        budget = asdict(self.budget)
+        settings = {"agent": self._entry.name, "options": self._options, "seed": self._seed, "budget": budget}
         return {**settings, "guided_by": self.wishes.files} if self.wishes.files else settings
+
+    @cached_property
+    def _entry(self) -> AgentEntry:
+        return find_agent(self.agent)
+
+    @property
+    def _options(self) -> dict[str, Any]:
+        """Those of a file, which a seed that was given replaces, and those that were given."""
+        ours = {name: value for name, value in self._entry.given.items() if name != "seed" or self.seed is None}
+        return ours | self.options
+
+    @property
+    def _seed(self) -> Any:
+        """The seed that is used, where one is; it is not checked yet."""
+        default = getattr(self._entry.default, "seed", 0) if self.seed is None else self.seed
+        return self._options.get("seed", default)
 
 
 @dataclass(frozen=True)
@@ -142,7 +160,7 @@ def _solve_each(
         except AutoPolyError as error:
             report.failed(str(job.image), str(error))
         except Exception as error:  # whatever it is, the other images can be solved
-            report.failed(str(job.image), _unexpected(error))
+            report.failed(str(job.image), described(error))
         else:
             overview.add(result, silhouette)
             report.solved(result)
@@ -159,7 +177,7 @@ def _load_kernels(settings: Settings, ctrl_c: CtrlC) -> None:
     mask[6:26, 6:26] = True
     mask[12:20, 12:20] = False
     with suppress(KeyboardInterrupt, Exception), ctrl_c.searching():
-        settings.new_agent().solve(settings.simulator(Silhouette(mask)), settings.budget)
+        solved(settings.new_agent(), settings.simulator(Silhouette(mask)), settings.budget)
 
 
 def _solve(job: Job, settings: Settings, out: Path, report: Report, ctrl_c: CtrlC) -> tuple[Result, Silhouette]:
@@ -167,7 +185,7 @@ def _solve(job: Job, settings: Settings, out: Path, report: Report, ctrl_c: Ctrl
     silhouette = load_silhouette(job.image, name=job.name)
     simulator, agent = settings.simulator(silhouette), settings.new_agent()
     with ctrl_c.searching():
-        solution = agent.solve(simulator, settings.budget, report.progress)
+        solution = solved(agent, simulator, settings.budget, report.progress)
     sequence = solution.sequence
     sequence = replace(sequence, settings={**sequence.settings, **settings.as_dict()})
     solution = replace(solution, sequence=sequence)
@@ -184,8 +202,3 @@ def _write_overview(overview: Overview, out: Path, report: Report) -> Path | Non
     except AutoPolyError as error:
         report.failed(str(out / OVERVIEW), str(error))
         return None
-
-
-def _unexpected(error: Exception) -> str:
-    place = traceback.extract_tb(error.__traceback__)[-1]
-    return f"{type(error).__name__}: {error} (unexpected, in {Path(place.filename).name} line {place.lineno})"

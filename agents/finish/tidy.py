@@ -6,21 +6,18 @@ sane meshes only. What they moved on the way moves with the step before or after
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 from autopoly_env.errors import AutoPolyError
 from autopoly_env.mesh import PolyMesh, is_sane
-from autopoly_env.operators import Action, Choice, Operator, operator_named
-from autopoly_env.operators.choices import Renaming
+from autopoly_env.operators import operator_named
 from autopoly_env.score import Score
 from autopoly_env.sequence import ConstructionSequence, Step
-from autopoly_env.sequence.ids import choice_indices
+from autopoly_env.sequence.follower import Follower, Standing, Taken
 from autopoly_env.sequence.variation import stay
 
 _MOST_LOST = 0.1  # of the IoU of a mesh on the way
 
-Taken = tuple[Action, Choice | None, PolyMesh]  # an action, its choice and the mesh after it
 Faces = set[tuple[int, ...]]
 
 
@@ -84,12 +81,12 @@ def _without(
     first = min(min(detour), max(kept, default=0))  # so that some step is told again, unless none is left
     kept = [k for k in kept if k >= first]
     ends = [*(k + 1 for k in kept[:-1]), len(steps)]  # the last takes over what moved after it
-    retold = _Retold(meshes[first], {name: name for name in meshes[first].vertex_ids})
+    follower = Follower(meshes[first], meshes[first], end_rule=_end_beyond, face_rule=_smallest_face)
     try:
-        taken = [retold.take(steps[k], meshes[k], meshes[end]) for k, end in zip(kept, ends, strict=False)]
+        taken = [_taken(follower, steps[k], meshes[k], meshes[end]) for k, end in zip(kept, ends, strict=False)]
     except AutoPolyError:
         return None
-    if not retold.is_same(meshes[-1]):
+    if not _is_same(follower, meshes[-1]):
         return None
     if not taken:  # nothing was done in the end
         return sequence.trim(0)
@@ -101,86 +98,46 @@ def _without(
     return replace(sequence, steps=(*steps[:first], *later.steps))
 
 
-@dataclass
-class _Retold:
-    """A construction that is told again with steps left out."""
+def _taken(follower: Follower, step: Step, before: PolyMesh, after: PolyMesh) -> Taken:
+    """Take a step again. Raises AutoPolyError where that cannot be done, or leaves a mesh that is not sane."""
+    taken = follower.take(step, before, after, stay)
+    if not is_sane(follower.mesh):
+        raise _DetourNeededError("a mesh on the way is not sane without it")
+    return taken
 
-    mesh: PolyMesh
-    names: dict[int, int]  # id of a vertex in this construction by its id in the old one; none for those left out
 
-    def take(self, step: Step, before: PolyMesh, after: PolyMesh) -> Taken:
-        """Take a step of the old construction, which leads from `before` to `after` there.
+def _end_beyond(standing: Standing, before: PolyMesh, end: int, other: int) -> int:
+    """Past a vertex that was left out, the next on the same line: each on the way is a point on an edge."""
+    first = end
+    while end not in standing.names:
+        v = before.vertex_index(end)
+        ends = [before.vertex_ids[a + b - v] for a, b in before.edges.tolist() if v in (a, b)]
+        beyond = [name for name in ends if name != other]
+        if len(beyond) != 1 or len(ends) != 2:
+            raise _DetourNeededError(f"vertex {end} is no point on an edge")
+        end, other = beyond[0], end
+        if end == first:
+            raise _DetourNeededError(f"vertex {end} is on a ring that was left out")
+    return standing.names[end]
 
-        Raises AutoPolyError where that cannot be done, or leaves a mesh that is not sane.
-        """
-        operator = operator_named(step.operator)
-        element = operator.element.index(self.mesh, self._element(step, before))
-        choice = choice_indices(self.mesh, operator, element, self._choice(operator, step))
-        made = operator.apply(self.mesh, element, choice)
-        created = [name for name in made.vertex_ids if name >= self.mesh.next_vertex_id]
-        self.names |= dict(zip(step.created["vertices"], created, strict=True))
-        vertices = made.vertices.copy()
-        left = set(made.vertex_ids)
-        for old, new in self.names.items():
-            if new in left and old in after.vertex_ids:
-                vertices[made.vertex_index(new)] = after.vertices[after.vertex_index(old)]
-        self.mesh = made.with_vertices(vertices)
-        if not is_sane(self.mesh):
-            raise _DetourNeededError("a mesh on the way is not sane without it")
-        return Action(step.operator, element), choice, self.mesh
 
-    def is_same(self, last: PolyMesh) -> bool:
-        """Whether the mesh is `last`, whatever the ids."""
-        old = {new: old for old, new in self.names.items()}
-        if tuple(old.get(name) for name in self.mesh.vertex_ids) != last.vertex_ids:
-            return False
-        same_places = self.mesh.vertices.tobytes() == last.vertices.tobytes()
-        return same_places and _cycles(self.mesh.faces) == _cycles(last.faces)
+def _smallest_face(standing: Standing, before: PolyMesh, face: int) -> int:
+    """The smallest face with all the vertices that the old one has before the step, those left out aside."""
+    names, mesh = standing.names, standing.mesh
+    old = (before.vertex_ids[v] for v in before.faces[before.face_index(face)])
+    wanted = {mesh.vertex_index(names[name]) for name in old if name in names}
+    found = [(len(cycle), k) for k, cycle in enumerate(mesh.faces) if wanted.issubset(cycle)]
+    if not found:
+        raise _DetourNeededError(f"face {face} is not there without it")
+    return mesh.face_ids[min(found)[1]]
 
-    def _element(self, step: Step, before: PolyMesh) -> dict[str, int | list[int]]:
-        """The element of a step by ids of this construction."""
-        element = dict(step.element)
-        match element:
-            case {"edge": [a, b]}:
-                element["edge"] = [self._end(before, a, b), self._end(before, b, a)]
-            case {"face": int(face)}:
-                element["face"] = self._face(before, face)
-        if "vertex" in element:
-            element["vertex"] = self._name(element["vertex"])
-        return element
 
-    def _choice(self, operator: Operator, step: Step) -> dict[str, Any] | None:
-        if step.choice is None or operator.choice is None:
-            return step.choice
-        return operator.choice.renamed(step.choice, Renaming(self._name, stay))
-
-    def _name(self, old: object) -> int:
-        if not isinstance(old, int) or old not in self.names:
-            raise _DetourNeededError(f"vertex {old} is not there without it")
-        return self.names[old]
-
-    def _end(self, before: PolyMesh, end: int, other: int) -> int:
-        """An end of an edge; where it was left out, the next vertex beyond it."""
-        first = end
-        while end not in self.names:
-            v = before.vertex_index(end)
-            ends = [before.vertex_ids[a + b - v] for a, b in before.edges.tolist() if v in (a, b)]
-            beyond = [name for name in ends if name != other]
-            if len(beyond) != 1 or len(ends) != 2:
-                raise _DetourNeededError(f"vertex {end} is no point on an edge")
-            end, other = beyond[0], end
-            if end == first:
-                raise _DetourNeededError(f"vertex {end} is on a ring that was left out")
-        return self.names[end]
-
-    def _face(self, before: PolyMesh, face: int) -> int:
-        """The smallest face with all the vertices, those left out aside."""
-        old = (before.vertex_ids[v] for v in before.faces[before.face_index(face)])
-        wanted = {self.mesh.vertex_index(self.names[name]) for name in old if name in self.names}
-        found = [(len(cycle), k) for k, cycle in enumerate(self.mesh.faces) if wanted.issubset(cycle)]
-        if not found:
-            raise _DetourNeededError(f"face {face} is not there without it")
-        return self.mesh.face_ids[min(found)[1]]
+def _is_same(follower: Follower, last: PolyMesh) -> bool:
+    """Whether the mesh is `last`, whatever the ids."""
+    old, mesh = {new: old for old, new in follower.names.items()}, follower.mesh
+    if tuple(old.get(name) for name in mesh.vertex_ids) != last.vertex_ids:
+        return False
+    return mesh.vertices.tobytes() == last.vertices.tobytes() and _cycles(mesh.faces) == _cycles(last.faces)
 
 
 def _cycles(faces: Sequence[Sequence[int]]) -> Faces:

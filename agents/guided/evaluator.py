@@ -6,7 +6,6 @@ complexity than the weights were trained with, every logit is corrected by what 
 for a softmax of r_all over a temperature is exact. Letters: A actions, K operator classes, S pixels a side.
 """
 
-from collections import OrderedDict
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -20,32 +19,29 @@ from agents.guided.nfap import Foresight, NfapNet, candidates_of
 from agents.guided.pictures import draw_inputs, rendering
 from agents.guided.warp import WarpNet
 from agents.guided.weights import NetworkMeta
+from agents.search.batched import BatchedEvaluator
 from agents.search.evaluator import ResidualEvaluator
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import IllegalActionError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import Action, Choice, operator_named
 from autopoly_env.placement import Disagreement, tried
-from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator, State
 
 _FLOOR = 1e-4  # of the likeliest action, for all
-_BATCH = 16  # states that are evaluated at once at most
 _REMEMBERED = 256  # states whose evaluation is kept
 
 
-class NfapEvaluator:
+class NfapEvaluator(BatchedEvaluator[Foresight]):
     """nFAP-Net's priors, exact refits: the agent `nfap-prior`."""
 
     def __init__(self, net: NfapNet, meta: NetworkMeta, temperature: float = 1.0) -> None:
+        super().__init__(_REMEMBERED)
         self._net, self._temperature = net, temperature
         labels = meta.training.get("labels", {})
         self._trained_w_sc = float(labels.get("w_sc", 0.3))
         self._label_temperature = float(labels.get("temperature", 1.0))
         self._residual = ResidualEvaluator()
-        self._target: Silhouette | None = None  # that the following two are about
-        self._said: OrderedDict[PolyMesh, Foresight] = OrderedDict()
-        self._waiting: list[PolyMesh] = []  # made and not evaluated yet: they are, with the next one that is asked for
 
     def prior(self, simulator: Simulator, state: State, actions: Sequence[Action]) -> FloatArray:
         disagreement = Disagreement(state.mesh, simulator.silhouette)
@@ -53,7 +49,7 @@ class NfapEvaluator:
         arrays["log_residual"] = np.log(self._residual.prior_by(disagreement, actions)).astype(np.float32)
         candidates = candidates_of({name: torch.from_numpy(array)[None] for name, array in arrays.items()})
         with torch.inference_mode():
-            logits = self._net.choose(self._first_stage(simulator, state), candidates)
+            logits = self._net.choose(self._said_of(simulator, state), candidates)
         is_known = arrays["classes"] >= 0
         if not is_known.any():
             return self._residual.prior_by(disagreement, actions)
@@ -64,46 +60,19 @@ class NfapEvaluator:
         normalised: FloatArray = odds / odds.sum()
         return normalised
 
-    def expand(self, simulator: Simulator, state: State, actions: Sequence[Action]) -> list[State]:
-        return self._made(simulator, simulator.transition_all(state, actions))
-
-    def _made(self, simulator: Simulator, states: list[State]) -> list[State]:
-        self._turn_to(simulator.silhouette)
-        waiting = [state.mesh for state in states if not state.done]
-        self._waiting = [*self._waiting, *waiting][-(_BATCH - 1) :]
-        return states
-
-    def _turn_to(self, target: Silhouette) -> None:
-        """Forget what was said about another target."""
-        if target is not self._target:
-            self._target, self._waiting = target, []
-            self._said.clear()
-
     def _extra_price(self, simulator: Simulator, actions: Sequence[Action]) -> FloatArray:
         """(A,) what the elements that each action adds cost more than in training, in units of the labels' softmax."""
         dearer = (simulator.weights.w_sc - self._trained_w_sc) / self._label_temperature
         return dearer * np.array([float(sum(_changes(action))) for action in actions])
 
-    def _first_stage(self, simulator: Simulator, state: State) -> Foresight:
-        """What the network says of a state; shapes that wait are evaluated in the same batch."""
-        self._turn_to(simulator.silhouette)
-        if state.mesh not in self._said:
-            meshes = dict.fromkeys([state.mesh, *self._waiting])
-            self._waiting = []
-            self._evaluate(simulator.silhouette, [mesh for mesh in meshes if mesh not in self._said])
-        self._said.move_to_end(state.mesh)
-        return self._said[state.mesh]
-
-    def _evaluate(self, silhouette: Silhouette, meshes: Sequence[PolyMesh]) -> None:
+    def _evaluate(self, simulator: Simulator, states: Sequence[State]) -> Iterable[Foresight]:
+        """The first stage of what the network foresees."""
         config = self._net.config
-        target = silhouette.target(config.image_size).coverage
-        pictures = np.stack([draw_inputs(mesh, target, config.inputs) for mesh in meshes])
+        target = simulator.silhouette.target(config.image_size).coverage
+        pictures = np.stack([draw_inputs(state.mesh, target, config.inputs) for state in states])
         with torch.inference_mode():
             said = self._net(torch.from_numpy(pictures), n_stages=1, with_images=False)
-        for row, mesh in enumerate(meshes):
-            self._said[mesh] = said.row(row)
-        while len(self._said) > _REMEMBERED:
-            self._said.popitem(last=False)
+        return [said.row(row) for row in range(len(states))]
 
 
 class WarpEvaluator(NfapEvaluator):
@@ -133,7 +102,7 @@ class WarpEvaluator(NfapEvaluator):
             _better(simulator, state, action, choice, before, after)
             for (action, choice, before), after in zip(begun, warped, strict=True)
         ]
-        return self._made(simulator, made)
+        return self._noted(simulator, made)
 
     def _begin(
         self, simulator: Simulator, state: State, actions: Sequence[Action]

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from agents.base import Agent
 from agents.budget import Meter, Progress
+from agents.contract import solved
 from agents.solution import Solution, Track
 from autopoly_env.operators import Action
 from autopoly_env.sequence import ConstructionSequence
@@ -40,7 +41,7 @@ def _solve_within(agent: Agent, simulator: Simulator, meter: Meter) -> Solution:
         meter.count(n_new, progress.best_total)
 
     budget = replace(meter.rest().share(SHARE), simulations=None)
-    solution = agent.solve(simulator, budget, report)
+    solution = solved(agent, simulator, budget, report)
     meter.add_refits(solution.stats.n_refits - n_counted)
     return solution
 

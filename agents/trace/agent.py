@@ -47,6 +47,7 @@ class TraceAgent(WholeAgent):
     """Traces, simplifies, refits once or twice per price, and constructs the best."""
 
     name = "trace"
+    config_class = TraceConfig
 
     def __init__(self, config: TraceConfig) -> None:
         self._config = config

@@ -1,75 +1,102 @@
-"""The formats that a construction sequence can be written in, by name."""
+"""The formats that a construction sequence can be written in: each registers itself at the end of its own file.
+
+Here is only where to find them, so that nobody has to load all writers for one.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from autopoly_env import viewer
-from autopoly_env.arrays import ByteArray
-from autopoly_env.export.blender import save_blender_script
-from autopoly_env.export.gif import save_gif
-from autopoly_env.export.gltf import save_gltf
-from autopoly_env.export.obj import to_obj
-from autopoly_env.export.player import save_html
-from autopoly_env.export.sheet import contact_sheet, save_png
-from autopoly_env.export.svg import sequence_to_svg
-from autopoly_env.files import write_atomically
-from autopoly_env.sequence import ConstructionSequence
-from autopoly_env.silhouette import Silhouette
+from autopoly_env import outside
+from autopoly_env.errors import ConfigError
 
-FRAME_SIZE = 400  # pixels a side of an animation's frame
+if TYPE_CHECKING:
+    from autopoly_env.sequence import ConstructionSequence
+    from autopoly_env.silhouette import Silhouette
 
 
 @dataclass(frozen=True)
 class Export:
     """What is to be written: a sequence that replays, and what goes with it."""
 
-    sequence: ConstructionSequence
-    target: Silhouette | None = None
+    sequence: "ConstructionSequence"
+    target: "Silhouette | None" = None
     depth: float = 0.0  # thickness of the mesh, in units of the unit square
 
 
 @dataclass(frozen=True)
 class Format:
-    """A format: the ending of its files, how one is written, and which parts of an `Export` it shows."""
+    """A format: its name, the endings of its files, how one is written, and which parts of an `Export` it shows.
 
-    suffix: str
-    write: Callable[[Export, Path], Path]
+    `write` makes the file, whole or not at all, and raises OutputError where it cannot. Raises ConfigError for endings
+    that are none.
+    """
+
+    name: str
+    suffixes: tuple[str, ...]  # such as .obj; files get the first, unless they have another
+    help: str  # a line
+    write: Callable[[Export, Path], object]
     shows_target: bool = False
     shows_depth: bool = False
 
+    def __post_init__(self) -> None:
+        if not self.suffixes or not all(s.startswith(".") and s == s.lower() for s in self.suffixes):
+            raise ConfigError(f"format {self.name!r} with the endings {self.suffixes}: expected some, such as .obj")
 
-def _write_svg(export: Export, path: Path) -> Path:
-    return write_atomically(path, sequence_to_svg(export.sequence, target=export.target))
-
-
-def _write_gif(export: Export, path: Path) -> Path:
-    return save_gif(_frames(export.sequence, export.target), path, fps=1.0)
-
-
-def _frames(sequence: ConstructionSequence, target: Silhouette | None) -> list[ByteArray]:
-    """Every mesh as the viewer shows it, what is new in green, with its step and its score below."""
-    meshes = sequence.meshes()
-    operators = ["start", *(step.operator for step in sequence.steps)]
-    scores = [sequence.start_score, *(step.score for step in sequence.steps)]
-    return [
-        viewer.draw_mesh(
-            mesh,
-            target,
-            size=FRAME_SIZE,
-            highlight=viewer.changed(meshes[max(k - 1, 0)], mesh),
-            caption=f"{k}  {operators[k]}\nr_all {scores[k]['total']:.2f}   IoU {scores[k]['iou']:.3f}",
-        )
-        for k, mesh in enumerate(meshes)
-    ]
+    @property
+    def suffix(self) -> str:
+        """What its files end in."""
+        return self.suffixes[0]
 
 
-FORMATS: dict[str, Format] = {
-    "html": Format(".html", lambda e, path: save_html(e.sequence, path, e.target), shows_target=True),
-    "svg": Format(".svg", _write_svg, shows_target=True),
-    "obj": Format(".obj", lambda e, path: write_atomically(path, to_obj(e.sequence.final()))),
-    "gltf": Format(".gltf", lambda e, path: save_gltf(e.sequence, path, e.depth), shows_depth=True),
-    "gif": Format(".gif", _write_gif, shows_target=True),
-    "png": Format(".png", lambda e, path: save_png(contact_sheet(e.sequence, e.target), path), shows_target=True),
-    "blender": Format(".py", lambda e, path: save_blender_script(e.sequence, path, e.depth), shows_depth=True),
-}
+# Name, module, and the line of help that is also in there: `--help` has no time to load them.
+LISTED = (
+    ("html", "player", "the player: a page to watch, with what to press in Blender"),
+    ("svg", "svg", "a drawing to edit, a layer for each step, the last one visible"),
+    ("obj", "obj", "the last mesh, with its n-gons; a solid of them with --depth"),
+    ("gltf", "gltf", "an animation for viewers and engines; binary in a file .glb"),
+    ("gif", "gif", "an animated picture"),
+    ("png", "sheet", "every step on one sheet"),
+    ("blender", "blender", "a Python script that builds the mesh with Blender's own operators"),
+)
+_MODULES = {name: module for name, module, _ in LISTED}
+_registered: dict[str, Format] = {}
+
+
+def register_format(made: Format) -> None:
+    """Make a format known by its name and its endings. Raises ConfigError for those that are taken."""
+    taken = {suffix: other.name for other in _registered.values() for suffix in other.suffixes}
+    others = [taken[suffix] for suffix in made.suffixes if suffix in taken]
+    if made.name in _registered or others:
+        raise ConfigError(f"format {made.name!r}: the name or an ending is taken by {(*others, made.name)[0]!r}")
+    _registered[made.name] = made
+
+
+def formats() -> dict[str, Format]:
+    """All formats by name, those of this package first."""
+    return {name: find_format(name) for name in (*_MODULES, *_registered)}
+
+
+def find_format(name: str) -> Format:
+    """The format of that name, or that my.module:FORMAT names. Raises ConfigError where there is none."""
+    if name in _MODULES:
+        import_module(f"{__package__}.{_MODULES[name]}")
+    if name in _registered:
+        return _registered[name]
+    if ":" not in name:
+        known = ", ".join(dict.fromkeys((*_MODULES, *_registered)))
+        raise ConfigError(f"unknown format {name!r}; give one of {known}, or my.module:FORMAT")
+    found = outside.load(name, "format")
+    if not isinstance(found, Format):
+        raise ConfigError(f"format {name!r} is {found!r:.60}; expected an autopoly_env.export.formats.Format")
+    return found
+
+
+def format_of(path: Path) -> Format:
+    """The format that a file's ending stands for. Raises ConfigError where it stands for none."""
+    known = {suffix: made for made in formats().values() for suffix in made.suffixes}
+    if path.suffix.lower() not in known:
+        raise ConfigError(f"{path}: no format has the ending {path.suffix or 'of nothing'}; give {', '.join(known)}")
+    return known[path.suffix.lower()]

@@ -1,4 +1,4 @@
-"""Animated GIFs, with Pillow alone."""
+"""Animated GIFs, with Pillow alone: of any frames, and of a sequence."""
 
 import io
 import os
@@ -8,12 +8,17 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from autopoly_env import viewer
 from autopoly_env.arrays import ByteArray
 from autopoly_env.errors import ConfigError
+from autopoly_env.export.formats import Export, Format, register_format
 from autopoly_env.files import write_atomically
+from autopoly_env.sequence import ConstructionSequence
+from autopoly_env.silhouette import Silhouette
 
 N_COLOURS = 256  # as many as GIF has
 LAST_FRAME_SECONDS = 2.0
+FRAME_SIZE = 400  # pixels a side of the frames of a sequence
 
 
 def save_gif(frames: Sequence[ByteArray], path: str | os.PathLike[str], *, fps: float = 2.0) -> Path:
@@ -50,3 +55,27 @@ def _pictures(frames: Sequence[ByteArray]) -> list[Image.Image]:
         pictures.append(Image.fromarray(numbers))
         pictures[-1].putpalette(common.astype(np.uint8).tobytes())
     return pictures
+
+
+def frames_of(sequence: ConstructionSequence, target: Silhouette | None = None) -> list[ByteArray]:
+    """Every mesh as the viewer shows it, what is new in green, with its step and its score below."""
+    meshes = sequence.meshes()
+    operators = ["start", *(step.operator for step in sequence.steps)]
+    scores = [sequence.start_score, *(step.score for step in sequence.steps)]
+    return [
+        viewer.draw_mesh(
+            mesh,
+            target,
+            size=FRAME_SIZE,
+            highlight=viewer.changed(meshes[max(k - 1, 0)], mesh),
+            caption=f"{k}  {operators[k]}\nr_all {scores[k]['total']:.2f}   IoU {scores[k]['iou']:.3f}",
+        )
+        for k, mesh in enumerate(meshes)
+    ]
+
+
+def _write(export: Export, path: Path) -> Path:
+    return save_gif(frames_of(export.sequence, export.target), path, fps=1.0)
+
+
+register_format(Format("gif", (".gif",), "an animated picture", _write, shows_target=True))

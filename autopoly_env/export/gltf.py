@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import ConfigError
+from autopoly_env.export.formats import Format, register_format
 from autopoly_env.export.replay import finite_meshes, sequence_name, unmoved
 from autopoly_env.export.solid import Solid, to_solid, to_triangles
 from autopoly_env.files import write_atomically
@@ -19,6 +20,7 @@ from autopoly_env.sequence import ConstructionSequence
 
 STEP_SECONDS = 1.0
 MOVE_SECONDS = 0.6  # of these
+SUFFIXES = (".gltf", ".glb")  # text and binary
 COLOUR = (0.32, 0.47, 0.76, 1.0)  # linear RGBA
 FLOAT, UINT = 5126, 5125  # component types
 VERTICES, INDICES = 34962, 34963  # what a buffer view is for
@@ -35,7 +37,7 @@ def save_gltf(sequence: ConstructionSequence, path: str | os.PathLike[str], dept
     replayed, OutputError if the file cannot be written.
     """
     suffix = Path(path).suffix.lower()
-    if suffix not in (".gltf", ".glb"):
+    if suffix not in SUFFIXES:
         raise ConfigError(f"{path}: expected a file name that ends in .gltf (text) or .glb (binary)")
     document, data = _document(sequence, depth)
     if suffix == ".glb":
@@ -150,3 +152,14 @@ def _binary(document: dict[str, Any], data: bytes) -> bytes:
     chunks = ((b"JSON", text + b" " * (-len(text) % 4)), (b"BIN\0", data + b"\0" * (-len(data) % 4)))
     body = b"".join(struct.pack("<I", len(content)) + kind + content for kind, content in chunks)
     return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
+
+
+register_format(
+    Format(
+        "gltf",
+        SUFFIXES,
+        "an animation for viewers and engines; binary in a file .glb",
+        lambda export, path: save_gltf(export.sequence, path, export.depth),
+        shows_depth=True,
+    )
+)

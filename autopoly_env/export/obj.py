@@ -4,6 +4,9 @@ import os
 from pathlib import Path
 
 from autopoly_env.errors import MeshError
+from autopoly_env.export.formats import Export, Format, register_format
+from autopoly_env.export.solid import to_solid_obj
+from autopoly_env.files import write_atomically
 from autopoly_env.mesh import PolyMesh
 
 
@@ -81,3 +84,13 @@ def _vertex(corner: str, n_vertices: int) -> int:
     if not 1 <= abs(number) <= n_vertices:
         raise ValueError(f"vertex {number} is not among the {n_vertices} so far")
     return number - 1 if number > 0 else n_vertices + number
+
+
+def _write(export: Export, path: Path) -> Path:
+    mesh = export.sequence.final()
+    return write_atomically(path, to_solid_obj(mesh, export.depth) if export.depth else to_obj(mesh))
+
+
+register_format(
+    Format("obj", (".obj",), "the last mesh, with its n-gons; a solid of them with --depth", _write, shows_depth=True)
+)

@@ -9,6 +9,7 @@ from PIL import Image, ImageDraw
 
 from autopoly_env import viewer
 from autopoly_env.errors import ConfigError
+from autopoly_env.export.formats import Export, Format, register_format
 from autopoly_env.files import write_atomically
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.sequence import ConstructionSequence
@@ -142,3 +143,10 @@ def _facts(best: ConstructionSequence, n_steps: int) -> str:
         f"r_sm {score['iou']:.4f}   r_sc {score['complexity']}   r_si {score['self_intersections']}   "
         f"r_all {score['total']:.2f}"
     )
+
+
+def _write(export: Export, path: Path) -> Path:
+    return save_png(contact_sheet(export.sequence, export.target), path)
+
+
+register_format(Format("png", (".png",), "every step on one sheet", _write, shows_target=True))

@@ -1,8 +1,11 @@
 """SVG: a mesh, or a construction step by step, as a drawing that stays editable: every element has its own id."""
 
 from html import escape
+from pathlib import Path
 
+from autopoly_env.export.formats import Export, Format, register_format
 from autopoly_env.export.pictures import picture_url
+from autopoly_env.files import write_atomically
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.mesh.drawing import drawing, groups
 from autopoly_env.sequence import ConstructionSequence
@@ -43,3 +46,14 @@ def _background(target: Silhouette | None, size: int) -> list[str]:
     if target is None:
         return []
     return [f'  <image id="target" width="{size}" height="{size}" href="{picture_url(target, BARE)}"/>']
+
+
+def _write(export: Export, path: Path) -> Path:
+    return write_atomically(path, sequence_to_svg(export.sequence, target=export.target))
+
+
+register_format(
+    Format(
+        "svg", (".svg",), "a drawing to edit, a layer for each step, the last one visible", _write, shows_target=True
+    )
+)

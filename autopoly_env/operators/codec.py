@@ -1,6 +1,7 @@
 """Actions by number, for a Discrete action space; which are legal; and what they are in words."""
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators.action import STOP, Action
 from autopoly_env.operators.elements import CAPACITY_PER_VERTEX
 from autopoly_env.operators.operator import Operator
-from autopoly_env.operators.registry import operator_named
+from autopoly_env.operators.registry import operator_named, preset
 
 
 class ActionCodec:
@@ -34,6 +35,13 @@ class ActionCodec:
         for operator in map(operator_named, operators):
             self._start[operator.name] = self.n_actions
             self.n_actions += self._capacity(operator)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "operators": tuple(map(operator_named, self.operators))}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Make the operators known to this process, too."""
+        vars(self).update(state, operators=tuple(operator.name for operator in preset(state["operators"])))
 
     def encode(self, action: Action) -> int:
         """The index of an action. Raises IllegalActionError if it has none."""

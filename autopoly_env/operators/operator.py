@@ -4,10 +4,12 @@ Only what it does has to be given: every other field has a default that is safe,
 made in one file and named once, in `register` or as `my.module:my_operator` wherever operators are asked for.
 """
 
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from importlib import import_module
+from typing import Any, SupportsIndex
 
 import numpy as np
 
@@ -34,6 +36,10 @@ def _listed(begin: Callable[[Evidence, int], Iterator[Start]], evidence: Evidenc
 
 def _always(_mesh: PolyMesh, _element: int) -> bool:
     return True
+
+
+def _found_at(module: str, name: str) -> Any:
+    return getattr(import_module(module), name)
 
 
 @dataclass(frozen=True)
@@ -139,6 +145,13 @@ class Operator:
         if self.sources is not None:
             return self.sources(before, element, choice, made)
         return made.vertices[[v for v, name in enumerate(made.vertex_ids) if name >= before.next_vertex_id]]
+
+    def __reduce_ex__(self, protocol: SupportsIndex) -> str | tuple[Any, ...]:
+        """Pickled by where it is found, as functions are; only what is nowhere goes as a whole."""
+        for name, value in vars(sys.modules.get(self.module, object)).items():
+            if value is self:
+                return _found_at, (self.module, name)
+        return super().__reduce_ex__(protocol)
 
     def _own(self, call: Callable[..., Any], *arguments: Any) -> Any:
         """What one of the operator's functions returns; whatever else it raises is told in one line."""

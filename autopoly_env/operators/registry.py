@@ -1,8 +1,8 @@
 """The registry of topological operators, and the presets; names and effects are those of Blender's operators."""
 
 from collections.abc import Iterable
-from importlib import import_module
 
+from autopoly_env import outside
 from autopoly_env.errors import ConfigError
 from autopoly_env.operators.edge_dissolve import edge_dissolve
 from autopoly_env.operators.edge_extrude import edge_extrude
@@ -80,11 +80,7 @@ def _asked_for(part: str | Operator) -> tuple[Operator, ...]:
 
 def _imported(place: str) -> Operator:
     """The operator at `my.module:my_operator`."""
-    module, _, name = place.partition(":")
-    try:
-        operator = getattr(import_module(module), name)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise ConfigError(f"operator {place!r} is not there ({error}); give module:name of an Operator") from None
+    operator = outside.load(place, "operator")
     if not isinstance(operator, Operator):
         raise ConfigError(f"{place} is a {type(operator).__name__}; expected an autopoly_env.operators.Operator")
     return operator

@@ -1,12 +1,13 @@
 """`Follower`: takes the steps of a construction again on another mesh, where ids and positions may differ.
 
 Steps name vertices and faces of the mesh that they were recorded on, the old one. A follower knows which of the new
-mesh's each of them is. Where a vertex in the middle of a boundary is missing, the edges beside it are one edge.
+mesh's each of them is. Two rules are handed in, for what some step that was left out, or taken otherwise, has left
+without a counterpart: which vertex stands for the missing end of an edge, and which face for an old one.
 """
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,15 +25,68 @@ Place = Callable[[FloatArray], FloatArray]  # where points (P, 2) of an old mesh
 Taken = tuple[Action, Choice | None, PolyMesh]
 
 
+class Standing(NamedTuple):
+    """How far a construction has been taken again: up to `mesh`, which `old` is the old mesh of."""
+
+    names: dict[int, int]  # id of a vertex in the new construction by its id in the old one; none for those left out
+    old: PolyMesh
+    mesh: PolyMesh
+
+
+EndRule = Callable[[Standing, PolyMesh, int, int], int]  # (.., old mesh before a step, an edge's end, its other) -> id
+FaceRule = Callable[[Standing, PolyMesh, int], int]  # (.., old mesh before a step, an old face) -> id in the new mesh
+
+
+def end_on_boundary(standing: Standing, before: PolyMesh, end: int, other: int) -> int:
+    """Past a missing vertex, the next along its boundary that is there: the edges beside it are one edge."""
+    v, u = before.vertex_index(end), before.vertex_index(other)
+    for loop in before.topology.boundary_loops:
+        ring = list(loop)
+        if v in ring and u in ring:
+            i, n = ring.index(v), len(ring)
+            for turn in (1, -1):
+                if ring[(i - turn) % n] == u:
+                    names = (before.vertex_ids[ring[(i + turn * k) % n]] for k in range(1, n))
+                    return next((standing.names[name] for name in names if name in standing.names), end)
+    raise _gone("vertex", end)
+
+
+def face_most_alike(standing: Standing, _: PolyMesh, face: int) -> int:
+    """Of a face of the old mesh that the last step led to, the new one with most of its vertices."""
+    old, mesh = standing.old, standing.mesh
+    if face in old.face_ids:
+        cycle = old.faces[old.face_index(face)]
+        corners = {standing.names.get(old.vertex_ids[v], -1) for v in cycle} - {-1}
+        others = [{mesh.vertex_ids[v] for v in other} for other in mesh.faces]
+        alike = [len(corners & other) / len(corners | other) for other in others]
+        if max(alike) > _ALIKE:
+            return mesh.face_ids[alike.index(max(alike))]
+    raise _gone("face", face)
+
+
 class Follower:
     """Where a construction stands that is taken again: the new mesh, and the old names of what is in it."""
 
-    def __init__(self, old: PolyMesh, mesh: PolyMesh, *, is_mirrored: bool = False) -> None:
+    def __init__(
+        self,
+        old: PolyMesh,
+        mesh: PolyMesh,
+        *,
+        is_mirrored: bool = False,
+        end_rule: EndRule = end_on_boundary,
+        face_rule: FaceRule = face_most_alike,
+    ) -> None:
         """`mesh` has the vertices of `old` under the same ids; with `is_mirrored` its faces are wound the other way."""
         self.mesh = mesh
         self._is_mirrored = is_mirrored
-        self._vertices = {name: name for name in old.vertex_ids if name in set(mesh.vertex_ids)}
-        self._faces = self._match_faces(old)
+        self._end_rule, self._face_rule = end_rule, face_rule
+        present = set(mesh.vertex_ids)
+        self._standing = Standing({name: name for name in old.vertex_ids if name in present}, old, mesh)
+
+    @property
+    def names(self) -> dict[int, int]:
+        """Of every old vertex that is there, its id in the new construction."""
+        return self._standing.names
 
     def take(self, step: Step, before: PolyMesh, after: PolyMesh, place: Place, *, is_moving: bool = True) -> Taken:
         """Take a step that once led from `before` to `after`; every vertex goes where `place` takes its old position.
@@ -46,9 +100,9 @@ class Follower:
         made = operator.apply(self.mesh, element, choice)
         created = [name for name in made.vertex_ids if name >= self.mesh.next_vertex_id]
         olds = step.created["vertices"]
-        self._vertices.update(zip(olds, reversed(created) if self._is_mirrored else created, strict=True))
+        self.names.update(zip(olds, reversed(created) if self._is_mirrored else created, strict=True))
         self.mesh = self._placed(made, after, place) if is_moving else made
-        self._faces = self._match_faces(after)
+        self._standing = Standing(self.names, after, self.mesh)
         return Action(step.operator, element), choice, self.mesh
 
     def do(self, step: Step) -> Taken:
@@ -70,35 +124,19 @@ class Follower:
                 case "vertex", int(name):
                     named[key] = self._vertex(name)
                 case "face", int(name):
-                    named[key] = self._face(name)
+                    named[key] = self._face_rule(self._standing, before, name)
                 case _:
                     named[key] = value
         return named
 
     def _end(self, before: PolyMesh, end: int, other: int) -> int:
-        """The new name of an edge's end; past vertices that are missing, the next along the boundary."""
-        if end in self._vertices:
-            return self._vertices[end]
-        v, u = before.vertex_index(end), before.vertex_index(other)
-        for loop in before.topology.boundary_loops:
-            ring = list(loop)
-            if v in ring and u in ring:
-                i, n = ring.index(v), len(ring)
-                for turn in (1, -1):
-                    if ring[(i - turn) % n] == u:
-                        names = (before.vertex_ids[ring[(i + turn * k) % n]] for k in range(1, n))
-                        return next((self._vertices[name] for name in names if name in self._vertices), end)
-        return self._vertex(end)
+        """The new name of an edge's end."""
+        return self.names[end] if end in self.names else self._end_rule(self._standing, before, end, other)
 
     def _vertex(self, name: int) -> int:
-        if name not in self._vertices:
-            raise SequenceError(f"vertex {name} is not there any more; drop this step, too")
-        return self._vertices[name]
-
-    def _face(self, name: int) -> int:
-        if name not in self._faces:
-            raise SequenceError(f"face {name} is not there any more; drop this step, too")
-        return self._faces[name]
+        if name not in self.names:
+            raise _gone("vertex", name)
+        return self.names[name]
 
     def _choice(self, operator: Operator, step: Step, place: Place) -> dict[str, Any] | None:
         if step.choice is None or operator.choice is None:
@@ -106,24 +144,14 @@ class Follower:
         return operator.choice.renamed(step.choice, Renaming(self._vertex, place, self._is_mirrored))
 
     def _placed(self, made: PolyMesh, after: PolyMesh, place: Place) -> PolyMesh:
-        present = set(made.vertex_ids)
+        present, names = set(made.vertex_ids), self.names
         places = zip(after.vertex_ids, place(after.vertices).tolist(), strict=True)
-        named = {self._vertices.get(name, -1): (x, y) for name, (x, y) in places}
+        named = {names.get(name, -1): (x, y) for name, (x, y) in places}
         return moved_to(made, {name: position for name, position in named.items() if name in present})
 
-    def _match_faces(self, old: PolyMesh) -> dict[int, int]:
-        """Of each old face the new one with most of its vertices."""
-        new = [
-            (name, {self.mesh.vertex_ids[v] for v in face})
-            for name, face in zip(self.mesh.face_ids, self.mesh.faces, strict=True)
-        ]
-        matches = {}
-        for name, face in zip(old.face_ids, old.faces, strict=True):
-            corners = {self._vertices.get(old.vertex_ids[v], -1) for v in face} - {-1}
-            alike = [len(corners & others) / len(corners | others) for _, others in new]
-            if max(alike) > _ALIKE:
-                matches[name] = new[alike.index(max(alike))][0]
-        return matches
+
+def _gone(kind: str, name: int) -> SequenceError:
+    return SequenceError(f"{kind} {name} is not there any more; drop this step, too")
 
 
 def moved_to(mesh: PolyMesh, positions: dict[int, tuple[float, float]]) -> PolyMesh:

@@ -12,7 +12,7 @@ from autopoly_env.errors import ConfigError
 from autopoly_env.raster import Batch, coverage_of_batch
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.targets.dice import Dice
-from autopoly_env.targets.families import FAMILIES, Family
+from autopoly_env.targets.families import FAMILIES, FAMILIES_V0, Family
 from autopoly_env.targets.pencil import Shape
 
 SALT = 2
@@ -26,8 +26,9 @@ SPECK = 36.0 / 256.0**2  # area in the unit square; smaller parts go and smaller
 class ObjectTargets:
     """Drawings of things; the seed also says of which family. A name is "family_seed".
 
-    `families`: names of FAMILIES, in a list or with commas between, by default all. `resolution` R: pixels a side, 64
-    to 2048; no part and no gap is narrower than 3 pixels at 256.
+    `families`: names of FAMILIES, in a list or with commas between, by default those of version 0. Whoever names some
+    draws among them in that order. `resolution` R: pixels a side, 64 to 2048; no part and no gap is narrower than 3
+    pixels at 256.
 
     Raises ConfigError for settings out of range.
     """
@@ -46,7 +47,7 @@ class ObjectTargets:
 
     def _names(self) -> list[str]:
         if self.families is None:
-            return list(FAMILIES)
+            return list(FAMILIES_V0)
         return self.families.split(",") if isinstance(self.families, str) else list(self.families)
 
     def sample(self, seed: int) -> Silhouette:

@@ -3,6 +3,7 @@
 import ast
 import json
 import os
+import re
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
@@ -15,13 +16,16 @@ import pytest
 from PIL import Image
 
 from agents.export import main
+from autopoly_env.errors import ConfigError
 from autopoly_env.export import to_obj
-from autopoly_env.export.formats import FORMATS
+from autopoly_env.export.formats import LISTED, Format, find_format, formats, register_format
+from autopoly_env.export.solid import to_solid_obj
 from autopoly_env.sequence import ConstructionSequence
 from tests.helpers.commands import Run, runner
 from tests.helpers.constructions import STEPS, house
 from tests.helpers.paths import ROOT
 
+FORMATS = formats()
 SVG = "{http://www.w3.org/2000/svg}"
 
 
@@ -139,6 +143,25 @@ def test_glb__is_chosen_by_the_name_of_the_file(run: Run) -> None:
     assert Path("house.glb").read_bytes()[:4] == b"glTF"
 
 
+@pytest.mark.parametrize("ending", [suffix for made in FORMATS.values() for suffix in made.suffixes])
+def test_ending_of_the_file__decides_where_no_format_is_named(run: Run, ending: str) -> None:
+    (made,) = (made for made in FORMATS.values() if ending in made.suffixes)
+    assert run(saved(), "--out", f"by_ending{ending}").code == 0
+    assert run("house.json", "--to", made.name, "--out", f"by_name{ending}").code == 0
+    assert Path(f"by_ending{ending}").read_bytes() == Path(f"by_name{ending}").read_bytes()
+    assert run("house.json", "--out", f"SHOUTED{ending.upper()}").code == 0
+
+
+def test_obj_with_depth__is_the_solid(run: Run) -> None:
+    run(saved(), "--out", "solid.obj", "--depth", 0.2)
+    assert Path("solid.obj").read_text() == to_solid_obj(house().final(), 0.2)
+
+
+def test_several_into_a_folder_with_a_dot__are_written_there(run: Run) -> None:
+    done = run(saved("a.json"), saved("b.json"), "--out", "house.v2", "--to", "obj")
+    assert (done.code, sorted(os.listdir("house.v2"))) == (0, ["a.obj", "b.obj"])
+
+
 def test_several__go_into_a_folder_each_by_its_own_name(run: Run) -> None:
     sources = [saved("a/chair/sequence.json"), saved("b/chair/sequence.json"), saved("mug.json"), saved("b/mug.json")]
     done = run(*sources, sources[0], "--to", "obj", "--out", "new/folder")
@@ -218,13 +241,26 @@ def test_missing_file__does_not_keep_the_others_from_being_written(run: Run) -> 
         ([], "Missing argument"),
         (
             ["house.json", "--to", "fbx"],
-            "--to fbx: unknown format; give one of html, svg, obj, gltf, gif, png, blender",
+            "unknown format 'fbx'; give one of html, svg, obj, gltf, gif, png, blender, or my.module:FORMAT",
         ),
-        (["house.json", "--to", "obj", "--depth", "1"], "--depth 1.0: obj is flat; use it with gltf, blender"),
+        (["house.json", "--to", "svg", "--depth", "1"], "--depth 1.0: svg is flat; use it with obj, gltf, blender"),
+        (["house.json", "--to", "obj", "--depth", "-1"], "depth -1.0"),
         (["house.json", "--to", "gltf", "--depth", "nan"], "depth nan"),
         (["house.json", "--to", "gltf", "--depth", "-1"], "depth -1.0"),
         (["house.json", "--to", "obj", "--target", "t.png"], "--target t.png: obj shows no target; use it with html"),
-        (["house.json", "--to", "gltf", "--out", "house.txt"], "expected a file name that ends in .gltf"),
+        (["house.json", "--to", "gltf", "--out", "house.txt"], "expected a file name that ends in .gltf or .glb"),
+        (
+            ["house.json", "--to", "obj", "--out", "a.svg"],
+            "--out a.svg with --to obj: expected a file name that ends in",
+        ),
+        (
+            ["house.json", "--out", "house.fbx"],
+            "house.fbx: no format has the ending .fbx; give .html, .htm, .svg, .obj",
+        ),
+        (["house.json", "--out", "house.v2"], "house.v2: no format has the ending .v2; give .html"),
+        (["house.json", "none.json", "--out", "a.obj"], "--out a.obj: one file for 2 sequences; give a folder"),
+        (["house.json", "--to", "nowhere:FBX"], "format 'nowhere:FBX': there is no module nowhere"),
+        (["house.json", "--to", "json:dumps"], "expected an autopoly_env.export.formats.Format"),
         (["house.json", "--out", "house.json"], "house.json: is a sequence"),
         (["house.json", "--step", "two"], "--step"),
     ],
@@ -259,6 +295,87 @@ def test_place__that_cannot_be_written_is_one_line(run: Run) -> None:
         done = run(saved(), "--to", name, "--out", f"file/house{FORMATS[name].suffix}")
         assert (done.code, done.out, len(done.err.splitlines())) == (1, "", 1)
         assert "cannot write file/house" in done.err
+
+
+# Formats from outside, and their registry
+
+BROUGHT = """
+from autopoly_env.export.formats import Format
+
+def write(export, path):
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(f"{len(export.sequence.steps)} steps, {export.depth}")
+
+def fail(export, path):
+    if len(export.sequence.steps) > 4:
+        raise KeyError(path.name)
+    write(export, path)
+
+COUNT = Format("count", (".txt",), "how many steps", write, shows_depth=True)
+BROKEN = Format("broken", (".txt",), "fails", fail)
+LAZY = Format("lazy", (".txt",), "writes nothing", lambda export, path: None)
+"""
+
+
+@pytest.fixture
+def brought(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    Path("brought_formats.py").write_text(BROUGHT)
+    monkeypatch.syspath_prepend(str(tmp_path))
+
+
+def test_format_from_outside__is_written(run: Run, brought: None) -> None:
+    done = run(saved(), "--to", "brought_formats:COUNT", "--depth", 0.5)
+    assert (done.code, done.out, done.err) == (0, "house.txt\n", "")
+    assert Path("house.txt").read_text() == f"{len(STEPS)} steps, 0.5"
+
+
+def test_documented_format__is_written(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(tmp_path))
+    docs = (ROOT / "docs" / "player.md").read_text(encoding="utf-8")
+    (snippet,) = (code for code in re.findall(r"```python\n(.*?)```", docs, re.DOTALL) if "COUNT = Format" in code)
+    Path("counting.py").write_text(snippet)
+    assert run(saved("a.json"), saved("b.json"), "--to", "counting:COUNT", "--out", "counts").code == 0
+    assert Path("counts/a.txt").read_text() == Path("counts/b.txt").read_text() == f"{len(STEPS)} steps\n"
+
+
+def test_writer_that_fails__is_one_line_and_the_others_are_written(run: Run, brought: None) -> None:
+    saved("long.json")
+    house().trim(2).save("short.json")
+    done = run("long.json", "short.json", "--to", "brought_formats:BROKEN", "--out", "texts")
+    assert (done.code, done.out) == (1, "texts/short.txt\n")
+    what = "the writer of broken failed: KeyError: 'long.txt' (brought_formats.py line 10)"
+    assert done.err == f"error: long.json: texts/long.txt: {what}\n"
+    done = run("short.json", "--to", "brought_formats:LAZY")
+    assert (done.code, done.err) == (1, "error: short.json: short.txt: the writer of lazy made no such file\n")
+
+
+def test_listed__is_what_the_formats_say_of_themselves() -> None:
+    assert [(made.name, made.help) for made in FORMATS.values()] == [(name, line) for name, _, line in LISTED]
+    assert FORMATS["gltf"].suffixes == (".gltf", ".glb")
+    endings = [suffix for made in FORMATS.values() for suffix in made.suffixes]
+    assert len(set(endings)) == len(endings)
+
+
+def test_register_format__refuses_what_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("autopoly_env.export.formats._registered", dict(FORMATS))
+    register_format(Format("count", (".txt",), "", print))
+    assert find_format("count").suffix == ".txt" and list(formats())[-1] == "count"
+    for name, suffix in (("count", ".a"), ("other", ".txt"), ("other", ".glb"), ("obj", ".b")):
+        with pytest.raises(ConfigError, match="the name or an ending is taken by"):
+            register_format(Format(name, (suffix,), "", print))
+    with pytest.raises(ConfigError, match=r"expected some, such as \.obj"):
+        Format("plain", ("obj",), "", print)
+
+
+def test_one_writer__does_not_load_the_others() -> None:
+    code = (
+        "import sys\nfrom autopoly_env.export.formats import find_format\nfind_format('gltf')\n"
+        "print(*[name for name in sys.modules if name.startswith('autopoly_env.export.')])"
+    )
+    env = os.environ | {"PYTHONPATH": str(ROOT)}
+    shown = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True).stdout
+    loaded = {name.removeprefix("autopoly_env.export.").split(".")[0] for name in shown.split()}
+    assert "gltf" in loaded and not loaded & {"obj", "svg", "gif", "sheet", "player", "blender"}
 
 
 def test_ctrl_c__is_one_line_and_leaves_nothing(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:

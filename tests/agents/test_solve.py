@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -20,6 +19,7 @@ from PIL import Image
 from agents.base import Decision
 from agents.baselines.beam import BeamAgent, BeamConfig
 from agents.commands.results import RESULTS
+from agents.entry import entry_of
 from agents.registry import AGENTS
 from agents.solve import main
 from autopoly_env.score import ScoreWeights, score
@@ -188,6 +188,12 @@ def test_option__reaches_the_agent_and_wins_over_the_seed(run: Run) -> None:
     assert settings["seed"] == 5
 
 
+def test_option__may_be_a_list_without_quotes_inside(run: Run) -> None:
+    small_image("box.png")
+    done = run("box.png", "--option", "seeds=[trace]", "--option", "hop_patience=0", "--json", *QUICK)
+    assert json.loads(done.out)["settings"]["options"] == {"seeds": ["trace"], "hop_patience": 0}
+
+
 def test_max_steps_and_refits__limit_the_work(run: Run) -> None:
     done = run(EXAMPLES / "chair.png", "--agent", "greedy", "--max-steps", 1, "--json", *QUICK)
     assert json.loads(done.out)["actions"] == 1
@@ -210,7 +216,8 @@ def test_max_steps_and_refits__limit_the_work(run: Run) -> None:
         (["box.png", "--w-sc", "-1"], "w_sc = -1.0"),
         (["box.png", "--refits", "-1"], "a budget of -1 refits"),
         (["box.png", "--max-steps", "-1"], "max_steps -1"),
-        (["box.png", "--option", "width"], "expected key=value"),
+        (["box.png", "--option", "width"], "--option width: expected key=value, such as width=4"),
+        (["box.png", "--option", "width=[4"], "--option width=[4: the value is not YAML"),
         (["box.png", "--option", "name=3"], "agent 'mcts' has no option 'name'"),
         (["box.png", "--option", "width=3"], "agent 'mcts' has no option 'width'"),
         (["box.png", "--agent", "beam", "--option", "width=wide"], "option width"),
@@ -299,11 +306,6 @@ def test_stdout__that_takes_nothing_more_is_one_line(run: Run, monkeypatch: pyte
 # Agents that misbehave on purpose, and Ctrl-C
 
 
-@dataclass(frozen=True)
-class NoConfig:
-    """An agent without options."""
-
-
 @pytest.fixture
 def agent_that(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[Callable[[State], Any]], None]]:
     """Registers `probe`: a greedy agent that calls a function of the state before every step."""
@@ -317,7 +319,7 @@ def agent_that(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[Callable[[
                 does(state)
                 return super().act(simulator, state)
 
-        monkeypatch.setitem(AGENTS, "probe", (lambda config: Probe(BeamConfig(width=1)), NoConfig()))
+        monkeypatch.setitem(AGENTS, "probe", entry_of(lambda: Probe(BeamConfig(width=1)), "probe"))
 
     yield register
 
@@ -446,7 +448,7 @@ def test_simulations__limit_a_tree_search_and_are_refused_by_others(run: Run) ->
 
 
 def test_help__names_every_agent_and_loads_nothing_heavy() -> None:
-    heavy = {"numba", "skimage", "shapely"}
+    heavy = {"numba", "skimage", "shapely", "torch", "pydantic"}
     code = f"import sys, agents.solve; agents.solve.main(['--help']); assert not {heavy} & set(sys.modules)"
     env = os.environ | {"PYTHONPATH": str(ROOT)}
     shown = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True).stdout

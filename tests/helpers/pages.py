@@ -1,6 +1,7 @@
 """Python in the pages of the documentation, and the files that it takes to be there."""
 
 import re
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -96,8 +97,15 @@ def _weights(folder: Path) -> None:
     Image.fromarray(np.tile(np.linspace(255, 60, 64).astype(np.uint8), (64, 1))).save(folder / "bit.png")
 
 
+def _modules_named_in_agents(folder: Path) -> None:
+    """The page's first block as the file that it says it is, where it can be imported from."""
+    write_atomically(folder / "hasty.py", snippets("docs/agents.md")[0].code)
+    sys.path.insert(0, str(folder))
+
+
 PREPARED: dict[str, Callable[[Path], None]] = {
     "CONTRIBUTING.md": _sequence("house.json"),
+    "docs/agents.md": _modules_named_in_agents,
     "docs/blender.md": _sequence("out/chair/sequence.json"),
     "docs/comparing.md": _evaluated,
     "docs/datasets.md": data_sets,

@@ -26,14 +26,19 @@ def simulator(target: str = "house", **settings: Any) -> Simulator:
     return Simulator(TARGETS[target], **{"resolution": 32, **settings})
 
 
-def quick(name: str) -> Agent:
+QUICK: dict[str, dict[str, Any]] = {
+    "beam": {"width": 2, "patience": 2},
+    "random": {"n_steps": 8},
+    "climb": {"n_rounds": 1},
+    "mcts": {"seeds": (), "n_simulations": 4, "patience": 1},
+    "mcts_paper": {"n_simulations": 4, "patience": 1, "n_rollout": 1},
+    "oracle": {"width": 2, "patience": 1},
+}
+
+
+def quick(name: str, **options: Any) -> Agent:
     """The agent with settings that keep a test short."""
-    options: dict[str, dict[str, Any]] = {
-        "beam": {"width": 2, "patience": 2},
-        "random": {"n_steps": 8},
-        "climb": {"n_rounds": 1},
-    }
-    return make_agent(name, **options.get(name, {}))
+    return make_agent(name, **{**QUICK.get(name, {}), **options})
 
 
 def interrupt_at(call: int) -> Callable[[Progress], None]:

@@ -7,9 +7,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from agents.baselines.beam import BeamConfig
-from agents.configs import load_agent, load_config
-from agents.registry import AGENTS, make_agent
+from agents.baselines.beam import BeamConfig, GreedyConfig
+from agents.registry import AGENTS, find_agent, make_agent
 from autopoly_env.errors import ConfigError
 from tests.helpers.paths import ROOT
 from tests.helpers.solving import simulator
@@ -18,10 +17,10 @@ FOLDER = ROOT / "configs" / "agent"
 NAMES = ("mcts", "mcts_paper", "greedy", "beam", "trace", "climb")
 
 
-def written(folder: Path, text: str | bytes, name: str = "beam.yaml") -> Path:
+def written(folder: Path, text: str | bytes, name: str = "beam.yaml") -> str:
     path = folder / name
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    return path
+    return str(path)
 
 
 def test_folder__holds_these() -> None:
@@ -31,8 +30,8 @@ def test_folder__holds_these() -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_file__says_everything_as_it_is_by_default(name: str) -> None:
     path = FOLDER / f"{name}.yaml"
-    _, default = AGENTS[name]
-    assert load_config(path) == default
+    default = AGENTS[name].default
+    assert find_agent(str(path)).config() == default
     assert list(yaml.safe_load(path.read_text())) == list(asdict(default))
 
 
@@ -42,15 +41,17 @@ def test_file__begins_with_its_command_and_what_that_gives(name: str) -> None:
     assert re.fullmatch(rf"# python -m agents\.solve examples --agent {name} .*: mean r_all \d+\.\d", first)
 
 
-def test_load_config__leaves_out_what_is_left_out(tmp_path: Path) -> None:
-    assert load_config(written(tmp_path, "width: 3\n")) == BeamConfig(width=3)
-    assert load_config(written(tmp_path, "# nothing\n")) == BeamConfig()
-    assert load_config(written(tmp_path, "patience: 2\n", "greedy.yaml")) == BeamConfig(width=1, patience=2)
-    assert load_config(written(tmp_path, "seeds: [trace]\n", "mcts.yaml")).seeds == ("trace",)
+def test_options__that_are_left_out_are_at_their_default(tmp_path: Path) -> None:
+    assert find_agent(written(tmp_path, "width: 3\n")).config() == BeamConfig(width=3)
+    assert find_agent(written(tmp_path, "# nothing\n")).config() == BeamConfig()
+    greedy = find_agent(written(tmp_path, "patience: 2\n", "greedy.yaml"))
+    assert greedy.config() == GreedyConfig(width=1, patience=2)
+    assert greedy.config(width=3) == GreedyConfig(width=3, patience=2)
+    assert find_agent(written(tmp_path, "seeds: [trace]\n", "mcts.yaml")).config().seeds == ("trace",)
 
 
-def test_load_agent__is_the_agent_with_these_options(tmp_path: Path) -> None:
-    agent, game = load_agent(written(tmp_path, "width: 2\npatience: 1\n")), simulator("house")
+def test_make_agent__of_a_file_is_the_agent_with_these_options(tmp_path: Path) -> None:
+    agent, game = make_agent(written(tmp_path, "width: 2\npatience: 1\n")), simulator("house")
     assert agent.name == "beam"
     assert agent.solve(game).sequence == make_agent("beam", width=2, patience=1).solve(game).sequence
 
@@ -73,18 +74,18 @@ def test_load_agent__is_the_agent_with_these_options(tmp_path: Path) -> None:
         (b"width: \x00", "not YAML"),
     ],
 )
-def test_load_config__says_in_one_line_what_is_wrong(tmp_path: Path, text: str | bytes, complaint: str) -> None:
+def test_broken_file__is_told_in_one_line(tmp_path: Path, text: str | bytes, complaint: str) -> None:
     path = written(tmp_path, text)
     with pytest.raises(ConfigError, match=complaint) as caught:
-        load_config(path)
-    assert "\n" not in str(caught.value) and str(path) in str(caught.value)
+        find_agent(path)
+    assert "\n" not in str(caught.value) and path in str(caught.value)
 
 
-def test_load_config__needs_a_file_that_is_named_after_an_agent(tmp_path: Path) -> None:
+def test_file__has_to_be_named_after_an_agent(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"no agent is called 'bean'; name the file after one of .*\bbeam\b"):
-        load_agent(written(tmp_path, "", "bean.yaml"))
+        make_agent(written(tmp_path, "", "bean.yaml"))
     with pytest.raises(ConfigError, match=r"cannot read .*beam\.yaml \(No such file or directory\)"):
-        load_agent(tmp_path / "beam.yaml")
-    with pytest.raises(ConfigError, match=r"cannot read .*beam \(Is a directory\)"):
-        (tmp_path / "beam").mkdir()
-        load_config(tmp_path / "beam")
+        make_agent(str(tmp_path / "beam.yaml"))
+    with pytest.raises(ConfigError, match=r"cannot read .*beam\.yml \(Is a directory\)"):
+        (tmp_path / "beam.yml").mkdir()
+        find_agent(str(tmp_path / "beam.yml"))

@@ -25,7 +25,8 @@ def doc_text() -> str:
 
 
 def test_operators_doc__has_the_registry_in_its_table() -> None:
-    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in doc_text().splitlines() if "| `" in line]
+    table = doc_text().partition("\n## ")[0]
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines() if "| `" in line]
     stated = []
     for name, element, effect, changes, presets in rows:
         numbers = [int(number.replace("−", "-")) for number in re.findall(r"[+−]?\d+", changes)]

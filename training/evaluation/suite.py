@@ -9,13 +9,12 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-import yaml
 from pydantic import ConfigDict, Field
 
 from agents.base import Agent
 from agents.budget import Budget
-from agents.options import read_yaml
-from agents.registry import AGENTS, make_agent
+from agents.options import put_override, read_yaml
+from agents.registry import AGENTS, SUFFIXES, find_agent
 from autopoly_env.errors import AutoPolyError, ConfigError
 from autopoly_env.score import ScoreWeights
 from autopoly_env.silhouette import Silhouette
@@ -46,7 +45,7 @@ class Printed:
 class Entry:
     """An agent of a suite: a row of its table."""
 
-    agent: str  # as in agents/registry.py
+    agent: str  # a name of agents/registry.py, my.module:Agent, or a YAML file of options (docs/agents.md)
     label: str = ""  # the agent's name if empty
     options: dict[str, Any] = field(default_factory=dict)
     weights: dict[WeightName, float] = field(default_factory=dict)  # of its search, not its score
@@ -75,7 +74,7 @@ class Suite:
     notes: tuple[str, ...] = ()  # shown below the table
 
     def __post_init__(self) -> None:
-        entries = tuple(replace(entry, label=entry.label or entry.agent) for entry in self.agents)
+        entries = tuple(_told_whole(replace(entry, label=entry.label or entry.agent)) for entry in self.agents)
         object.__setattr__(self, "agents", entries)
         labels = [entry.label for entry in entries]
         if not entries or len(set(labels)) < len(labels) or GROUND_TRUTH in labels:
@@ -109,7 +108,7 @@ class Suite:
     def new_agent(self, entry: Entry, seed: int) -> Agent:
         """A fresh agent, drawing from `seed` if it draws at all. Raises ConfigError where there is no such agent."""
         options = {"seed": seed, **entry.options} if takes_seed(entry) else entry.options
-        return make_agent(entry.agent, **options)
+        return find_agent(entry.agent).agent(**options)
 
     def check(self) -> None:
         """Raise ConfigError for an agent that must be there and is not, and for settings out of range."""
@@ -135,8 +134,22 @@ class Suite:
 
 def takes_seed(entry: Entry) -> bool:
     """Whether an agent's result depends on the seed."""
-    is_known = entry.agent in AGENTS
-    return is_known and "seed" in AGENTS[entry.agent][1].__dataclass_fields__ and "seed" not in entry.options
+    try:
+        return "seed" in find_agent(entry.agent).options and "seed" not in entry.options
+    except ConfigError:
+        return False
+
+
+def _told_whole(entry: Entry) -> Entry:
+    """The entry with what is in its file of options, so that a run does not depend on the file any more.
+
+    A seed in there is that of a single solve; those of a suite are its own.
+    """
+    if not entry.agent.endswith(SUFFIXES):
+        return entry
+    found = find_agent(entry.agent)
+    given = {name: value for name, value in found.given.items() if name != "seed"}
+    return replace(entry, agent=found.name, options={**given, **entry.options})
 
 
 def task_seed(seed: int, target: str) -> int:
@@ -166,7 +179,7 @@ def find_suite(given: str, overrides: Sequence[str] = ()) -> Suite:
             raise ConfigError(f"suite {given!r} is unknown; give one of {known}, a YAML file, or a folder of images")
     values = {"name": path.stem, **read_yaml(path, "a suite", may_be_empty=False)}
     for override in extra:
-        _apply(values, override)
+        put_override(values, override, f"--set {override}", "targets.n=10")
     return build_config(Suite, values, str(path) if path.parent != FOLDER else f"suite {path.stem}")
 
 
@@ -177,7 +190,7 @@ def with_budget(suite: Suite, text: str) -> Suite:
         if part.partition("=")[0] not in Budget.__dataclass_fields__:
             known = " or ".join(f"{name}=N" for name in Budget.__dataclass_fields__)
             raise ConfigError(f"--budget {text}: expected {known}")
-        _apply(values, part)
+        put_override(values, part, f"--budget {text}", "refits=500")
     budget = build_config(Budget, values, f"--budget {text}")
     return replace(suite, budget=budget, agents=tuple(replace(entry, budget=None) for entry in suite.agents))
 
@@ -192,28 +205,11 @@ def chosen(suite: Suite, names: Sequence[str]) -> tuple[Suite, set[str]]:
         meant = {e.label for e in suite.agents if e.label == name} or {e.label for e in suite.agents if e.agent == name}
         if name == GROUND_TRUTH:
             meant = {name}
-        elif not meant and name in AGENTS:
+        elif not meant and (name in AGENTS or ":" in name or name.endswith(SUFFIXES)):
             suite = replace(suite, agents=(*suite.agents, Entry(name)))
             meant = {name}
         if not meant:
             known = dict.fromkeys((*(entry.label for entry in suite.agents), *AGENTS))
-            raise ConfigError(f"agent {name!r} is unknown; give some of {', '.join(known)}")
+            raise ConfigError(f"agent {name!r} is unknown; give some of {', '.join(known)}, or my.module:Agent")
         labels |= meant
     return suite, labels
-
-
-def _apply(values: dict[Any, Any], override: str) -> None:
-    """Put `section.key=value` into plain values; a value is YAML."""
-    path, equals, text = override.partition("=")
-    *sections, key = path.split(".")
-    try:
-        value = yaml.safe_load(text)
-    except (yaml.YAMLError, ValueError, RecursionError):
-        raise ConfigError(f"--set {override}: the value is not YAML; quote it or correct it") from None
-    for section in sections:
-        values = values.setdefault(section, {})
-        if not isinstance(values, dict):
-            raise ConfigError(f"--set {override}: {section!r} is no section; give such as targets.n=10")
-    if not (key and equals):
-        raise ConfigError(f"--set {override}: expected section.key=value, such as targets.n=10")
-    values[key] = value

@@ -60,7 +60,7 @@ class ObjectsSpec:
 
     kind: Literal["objects"]
     n: int = 41
-    families: tuple[str, ...] | None = None  # all
+    families: tuple[str, ...] | None = None  # those of version 0
     resolution: int = 256
     split: Literal["train", "test"] = "test"
 

@@ -10,6 +10,7 @@ import numpy as np
 from PIL import Image
 
 from agents.budget import Budget, Progress
+from agents.contract import solved
 from autopoly_env.errors import AutoPolyError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.score import Score
@@ -85,7 +86,7 @@ def _solved(suite: Suite, task: EvalTask, silhouette: Silhouette) -> Outcome:
     agent = suite.new_agent(entry, task_seed(task.seed, task.target.name))
     simulator, curve = suite.simulator(silhouette, entry), Curve()
     began = time.perf_counter()
-    solution = agent.solve(simulator, entry.budget or suite.budget, curve)
+    solution = solved(agent, simulator, entry.budget or suite.budget, curve)
     seconds = time.perf_counter() - began
     if solution.stats.stopped_by == "interrupted":
         raise KeyboardInterrupt  # half a search is not a result
@@ -155,4 +156,4 @@ def _warm_up(suite: Suite, entry: Entry) -> None:
         mask[6:26, 6:26] = True
         mask[12:20, 12:20] = False
         with suppress(Exception):
-            suite.new_agent(entry, 0).solve(suite.simulator(Silhouette(mask), entry), WARM_UP)
+            solved(suite.new_agent(entry, 0), suite.simulator(Silhouette(mask), entry), WARM_UP)

@@ -2,5 +2,16 @@
 
 from autopoly_env.export.blender.real import Job, find_blender, mismatches, run_in_blender
 from autopoly_env.export.blender.script import blender_script, save_blender_script
+from autopoly_env.export.formats import Format, register_format
 
 __all__ = ["Job", "blender_script", "find_blender", "mismatches", "run_in_blender", "save_blender_script"]
+
+register_format(
+    Format(
+        "blender",
+        (".py",),
+        "a Python script that builds the mesh with Blender's own operators",
+        lambda export, path: save_blender_script(export.sequence, path, export.depth),
+        shows_depth=True,
+    )
+)

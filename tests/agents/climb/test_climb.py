@@ -118,6 +118,17 @@ def test_tops__take_the_outline_of_a_mesh() -> None:
     assert isinstance(place, Place) and len(place.outline.rings[0].points) == 8
 
 
+def test_tops__build_nothing_that_is_out_of_reach() -> None:
+    game = simulator("house", operators="paper", max_steps=1)
+    extruded = max(game.transition_all(game.initial()), key=lambda state: len(state.mesh.vertices)).mesh
+    assert extruded.counts == (6, 7, 2)  # one step, whose outline takes two
+    tops = Tops(Hill(game))
+    tops.add_mesh(extruded)
+    assert len(tops.built()) == 1
+    tops.add(tops.hill.place(outline(np.insert(BOX, 1, (0.5, 0.05), axis=0))))
+    assert len(tops.built()) == 2
+
+
 def hopped(seed: int, patience: int = 15, budget: Budget | None = None) -> list[float]:
     hill = Hill(Simulator(dumbbell(), resolution=64, weights=ScoreWeights(w_sc=1.0)))
     meter = Meter(budget or Budget())

@@ -17,7 +17,7 @@ from autopoly_env.operators import STOP
 from autopoly_env.score import ScoreWeights
 from autopoly_env.simulator import Simulator
 from tests.helpers.drawings import FRAME, HOUSE, L_SHAPE, SQUARE, painted
-from tests.helpers.solving import TARGETS, assert_consistent, interrupt_at, simulator
+from tests.helpers.solving import assert_consistent, interrupt_at, simulator
 
 BOX = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
 DENTED = np.insert(BOX, 1, (0.5, 0.1), axis=0)  # a pentagon: the vertex in its top edge spans the least area
@@ -62,14 +62,6 @@ def test_decimate__finds_simple_shapes_perfectly(shape: object, n_elements: tupl
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("operators", ["full", "paper"])
-@pytest.mark.parametrize("target", TARGETS)
-def test_solve__returns_what_its_sequence_builds(target: str, operators: str) -> None:
-    game = simulator(target, operators=operators)
-    assert_consistent(make_agent("decimate").solve(game), game)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("w_sc", [0.1, 1.0])
 @pytest.mark.parametrize("n", [4, 7, 12])
 def test_max_vertices__is_kept_at_any_price(n: int, w_sc: float) -> None:
@@ -84,17 +76,6 @@ def test_max_vertices__buys_more_where_vertices_are_cheap() -> None:
     game = simulator("blobs", weights=ScoreWeights(w_sc=0.1))
     totals = [make_agent("decimate", max_vertices=n).solve(game).score.total for n in (4, 8, None)]
     assert totals == sorted(totals) and totals[0] < totals[-1]
-
-
-def test_decimate__solves_the_same_twice() -> None:
-    game, agent = simulator("island"), make_agent("decimate")
-    assert agent.solve(game).sequence == agent.solve(game).sequence
-
-
-def test_decimate__keeps_to_the_step_limit() -> None:
-    for max_steps in (0, 1, 2, 9):
-        game = simulator("island", max_steps=max_steps)
-        assert_consistent(make_agent("decimate").solve(game), game)
 
 
 @pytest.mark.slow

@@ -21,7 +21,7 @@ from agents.guided.nfap import NfapLabels, NfapNet, candidates_of, loss_terms
 from agents.guided.pictures import draw_inputs
 from agents.guided.regions import N_POINTS, action_points, region_image
 from agents.guided.warp import WarpNet
-from agents.guided.weights import SHIPPED, NetworkMeta, load_nfap, load_warpnet, save_weights
+from agents.guided.weights import SHIPPED, NetworkMeta, load_nfap, load_warpnet
 from agents.registry import make_agent
 from agents.search.evaluator import ResidualEvaluator
 from autopoly_env.errors import ConfigError
@@ -32,6 +32,7 @@ from autopoly_env.raster import coverage
 from autopoly_env.score import ScoreWeights
 from autopoly_env.simulator import Simulator
 from tests.helpers.drawings import BOTTLE, FRAME, HOUSE, painted
+from tests.helpers.networks import PAPER, RICH, make_net, saved_networks
 from tests.helpers.paths import ROOT
 from training.networks.labelling import SourceConfig
 from training.networks.samples import LabelConfig
@@ -41,13 +42,6 @@ torch.set_num_threads(1)  # as tests run beside each other
 
 FULL = [operator.name for operator in PRESETS["full"]]
 MESH = PolyMesh.grid(2, 0.2, 0.2, 0.8, 0.8)
-PAPER = NfapConfig(n=2, image_size=32, feature=16, widths=(4, 4, 8, 8))
-RICH = replace(PAPER, inputs=("current", "target", "edges", "vertices"), skips=True, regions="each", residual=True)
-
-
-def make_net(config: NfapConfig = RICH, seed: int = 0) -> NfapNet:
-    torch.manual_seed(seed)
-    return NfapNet(config).eval()
 
 
 def meta_of(training: dict[str, Any]) -> NetworkMeta:
@@ -62,12 +56,7 @@ def make_evaluator(net: NfapNet | None = None, temperature: float = 0.5) -> Nfap
 @pytest.fixture
 def weights(tmp_path: Path) -> dict[str, str]:
     """Files of random weights of both networks."""
-    warp = WarpNet(WarpConfig(image_size=32, grid=4, feature=16, widths=(4, 4, 8, 8)))
-    labels = {"labels": {"w_sc": 0.3, "temperature": 0.5}}
-    return {
-        "nfap": str(save_weights(tmp_path / "a.safetensors", make_net(), labels, {})),
-        "warpnet": str(save_weights(tmp_path / "b.safetensors", warp, {}, {})),
-    }
+    return saved_networks(tmp_path)
 
 
 # --- regions ---

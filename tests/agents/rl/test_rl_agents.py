@@ -10,8 +10,6 @@ import torch
 
 from agents.budget import Budget
 from agents.registry import AGENTS, make_agent
-from agents.rl.config import NetConfig, SpaceSpec
-from agents.rl.network import MeshNet
 from agents.rl.player import Player
 from agents.rl.weights import load_policy, save_policy
 from autopoly_env.errors import ConfigError
@@ -19,22 +17,12 @@ from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import STOP
 from autopoly_env.simulator import Simulator
 from tests.helpers.drawings import L_SHAPE, painted
+from tests.helpers.networks import SPEC, policy, saved_policy
 from training import evaluate
 
 torch.set_num_threads(1)  # as tests run beside each other
 
-SPEC = SpaceSpec(max_vertices=16, obs_resolution=32, max_steps=6)
 NAMES = ("ppo", "maskable-ppo", "a2c", "dqn")
-
-
-def policy(seed: int = 0, spec: SpaceSpec = SPEC) -> MeshNet:
-    """One that has its own mind, and does not stop at once."""
-    torch.manual_seed(seed)
-    net = MeshNet(NetConfig(widths=(4, 4, 4), width=8, n_rounds=1), spec)
-    for parameter in net.action_net.parameters():
-        torch.nn.init.normal_(parameter, std=0.5)
-    torch.nn.init.constant_(net.action_net.stop[-1].bias, -5.0)
-    return net
 
 
 def game(**settings: Any) -> Simulator:
@@ -43,8 +31,7 @@ def game(**settings: Any) -> Simulator:
 
 @pytest.fixture(scope="module")
 def weights(tmp_path_factory: pytest.TempPathFactory) -> str:
-    path = tmp_path_factory.mktemp("policy") / "policy.safetensors"
-    return str(save_policy(path, policy(), "maskable_ppo", {"why": "a test"}, {"final": 1.0}))
+    return saved_policy(tmp_path_factory.mktemp("policy"))
 
 
 # --- what they choose ---

@@ -29,8 +29,9 @@ from autopoly_env.targets import (
     make_targets,
     split_seed,
 )
-from autopoly_env.targets.families import FAMILIES
+from autopoly_env.targets.families import FAMILIES, FAMILIES_V0, Family
 from autopoly_env.targets.growth import OUTLINE_OPERATORS
+from autopoly_env.targets.pencil import box
 from docs import draw_targets
 from tests.helpers.paths import ROOT
 
@@ -359,6 +360,24 @@ def test_families__may_be_chosen() -> None:
     chosen = ObjectTargets(["mug", "key"])
     assert {chosen.sample(seed).name.split("_")[0] for seed in range(30)} == {"mug", "key"}
     assert digest(ObjectTargets("mug,key").sample(3)) == digest(chosen.sample(3))
+
+
+def test_families_v0__are_the_41_that_seeds_have_always_been_drawn_among() -> None:
+    assert (len(FAMILIES_V0), FAMILIES_V0[0], FAMILIES_V0[26], FAMILIES_V0[-1]) == (41, "chair", "ladder", "rocket")
+    assert set(FAMILIES_V0) <= set(FAMILIES)
+    drawn = " ".join(ObjectTargets(resolution=64).sample(seed).name.split("_")[0] for seed in range(12))
+    assert drawn == "teapot pan screwdriver car anchor umbrella pan sofa lamp signpost screwdriver glass"
+
+
+def test_a_new_family__changes_no_seed_of_version_0(monkeypatch: pytest.MonkeyPatch) -> None:
+    source = ObjectTargets(resolution=64)
+    before = [digest(source.sample(seed)) for seed in range(30)]
+    slab = {"slab": Family(lambda dice: box(0.0, 0.0, 1.0, dice.between(0.2, 0.4)))}
+    everything = {**slab, **FAMILIES, "plank": slab["slab"]}
+    monkeypatch.setattr("autopoly_env.targets.objects.FAMILIES", everything)
+    assert [digest(source.sample(seed)) for seed in range(30)] == before
+    assert ObjectTargets(["slab"], resolution=64).sample(3).name == "slab_3"
+    assert {ObjectTargets("mug,plank").sample(seed).name.split("_")[0] for seed in range(20)} == {"mug", "plank"}
 
 
 def test_thing__is_the_same_at_another_resolution() -> None:
