@@ -251,15 +251,25 @@ def _environment(variables: dict[str, str]) -> Iterator[None]:
 
 @contextmanager
 def _no_interrupts() -> Iterator[None]:
-    """Ctrl-C goes to all processes of a terminal: those that are started within never hear of it, their parent does."""
+    """Ctrl-C goes to all processes of a terminal: those that are started within never hear of it, their parent does,
+    once they have been started: half a start would be a worker that complains of a torn pipe.
+    """
     if not hasattr(signal, "pthread_sigmask"):  # on Windows
         yield
         return
+    came: list[int] = []
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    # The mask is of this thread alone: where another one takes the signal, Python calls the handler in this one still.
+    is_main = threading.current_thread() is threading.main_thread()
+    handler = signal.signal(signal.SIGINT, lambda number, frame: came.append(number)) if is_main else None
     try:
         yield
     finally:
+        if handler is not None:
+            signal.signal(signal.SIGINT, handler)
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        if came:
+            signal.raise_signal(signal.SIGINT)
 
 
 # Ray

@@ -1,10 +1,12 @@
 """`map_tasks`: the same results from every engine, whatever happens to the workers."""
 
+import multiprocessing
 import os
 import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import closing
@@ -170,3 +172,27 @@ def test_ray_address__where_nobody_answers_is_one_line_soon(monkeypatch: pytest.
     assert time.monotonic() - began < 5.0
     with pytest.raises(ConfigError, match=r"no Ray cluster answers at 'auto' \(.*\); start one"):
         map_tasks(do, SQUARES, engine="ray", address="auto")
+
+
+def test_ctrl_c__while_a_worker_starts_waits_until_it_has_started(monkeypatch: pytest.MonkeyPatch) -> None:
+    process = multiprocessing.get_context("spawn").Process
+    start, started = process.start, []
+
+    def interrupted_start(self: Any) -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.1)  # for whichever thread takes it
+        start(self)
+        started.append(self)
+
+    monkeypatch.setattr(process, "start", interrupted_start)
+    over = threading.Event()
+    another = threading.Thread(target=over.wait)  # which does not block the signal
+    another.start()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            results(SQUARES, engine="process", n_workers=2)
+    finally:
+        over.set()
+        another.join()
+    assert len(started) == 1
+    assert wait_until(lambda: not started[0].is_alive())

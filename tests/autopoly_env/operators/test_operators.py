@@ -395,10 +395,13 @@ def test_preset__takes_a_name_or_a_list() -> None:
     for wrong in ("edge_extrude,edge_extrude", "full,edge_extrude"):
         with pytest.raises(ConfigError, match="edge_extrude stands there twice"):
             preset(wrong)
-    for wrong in ("no.such.module:edge_cut", "autopoly_env.errors:edge_cut", "autopoly_env.errors:MeshError", ":"):
-        with pytest.raises(
-            ConfigError, match=r"module:name of an Operator|expected an autopoly_env.operators.Operator"
-        ):
+    for wrong, said in {
+        "no.such.module:edge_cut": "there is no module no;",
+        "autopoly_env.errors:edge_cut": "autopoly_env.errors has no attribute edge_cut",
+        "autopoly_env.errors:MeshError": "expected an autopoly_env.operators.Operator",
+        ":": "such as my.module:name",
+    }.items():
+        with pytest.raises(ConfigError, match=said):
             preset(wrong)
 
 
