@@ -15,8 +15,8 @@ from autopoly_env.placement import Disagreement, tried
 from autopoly_env.silhouette import Silhouette
 
 _NEW_RING_SIZES = (3, 4, 5, 6, 8)
-_CLUMSY_BLAME = 1e-4  # area (unit square) that every edge answers for when one is drawn at random
-_JITTER = 0.03  # standard deviation (unit square) of a vertex that is shaken
+CLUMSY_BLAME = 1e-4  # area (unit square) that every edge answers for when one is drawn at random
+JITTER = 0.03  # standard deviation (unit square) of a vertex that is shaken
 
 
 def neighbours(
@@ -27,9 +27,9 @@ def neighbours(
     for k, ring in enumerate(outline.rings):
         if len(ring.points) > 3:
             yield from (outline.with_ring(k, _without(ring, i)) for i in range(len(ring.points)))
-    for row in _blamed_rows(disagreement, n_blamed):
-        yield _grown(outline, disagreement, row, "edge_subdivide")
-        yield _grown(outline, disagreement, row, "edge_extrude")
+    for row in blamed_rows(disagreement, n_blamed):
+        yield grown_at(outline, disagreement, row, "edge_subdivide")
+        yield grown_at(outline, disagreement, row, "edge_extrude")
     yield from (outline.without_ring(k) for k in range(1, len(outline.rings)))
     yield from (_opened(outline, k) for k, ring in enumerate(outline.rings) if ring.is_hole)
     if len(outline.rings) < len(contours):
@@ -41,8 +41,8 @@ def neighbours(
 def relocations(outline: Outline, silhouette: Silhouette, n_blamed: int) -> Iterator[Outline]:
     """A vertex taken away here and added there."""
     disagreement = Disagreement(outline.loops, silhouette)
-    for row in _blamed_rows(disagreement, n_blamed):
-        grown = _grown(outline, disagreement, row, "edge_subdivide")
+    for row in blamed_rows(disagreement, n_blamed):
+        grown = grown_at(outline, disagreement, row, "edge_subdivide")
         for k, (old, new) in enumerate(zip(outline.rings, grown.rings, strict=True)):
             old_points = {tuple(p) for p in old.points}
             if len(new.points) > 4:
@@ -55,16 +55,16 @@ def shaken(outline: Outline, silhouette: Silhouette, rng: np.random.Generator) -
     for _ in range(rng.integers(1, 3)):
         if rng.random() < 0.5:
             disagreement = Disagreement(outline.loops, silhouette)
-            blame = disagreement.blame[:, :, 0].max(axis=1) + _CLUMSY_BLAME
+            blame = disagreement.blame[:, :, 0].max(axis=1) + CLUMSY_BLAME
             row = int(rng.choice(len(blame), p=blame / blame.sum()))
-            outline = _grown(outline, disagreement, row, "edge_subdivide" if rng.random() < 0.6 else "edge_extrude")
+            outline = grown_at(outline, disagreement, row, "edge_subdivide" if rng.random() < 0.6 else "edge_extrude")
         if rng.random() < 0.7:
             outline = _with_one_less(outline, rng)
         if len(outline.rings) > 1 and rng.random() < 0.1:
             outline = outline.without_ring(int(rng.integers(1, len(outline.rings))))
     if rng.random() < 0.3:
         for k, ring in enumerate(outline.rings):
-            outline = outline.with_ring(k, Ring(ring.points + rng.normal(0.0, _JITTER, ring.points.shape), ring.parent))
+            outline = outline.with_ring(k, Ring(ring.points + rng.normal(0.0, JITTER, ring.points.shape), ring.parent))
     return outline
 
 
@@ -77,7 +77,7 @@ def _with_one_less(outline: Outline, rng: np.random.Generator) -> Outline:
     return outline.with_ring(k, _without(outline.rings[k], i))
 
 
-def _blamed_rows(disagreement: Disagreement, n_most: int) -> list[int]:
+def blamed_rows(disagreement: Disagreement, n_most: int) -> list[int]:
     """Rows of the boundary edges with most blame, those without any left out."""
     blame = disagreement.blame[:, :, 0].max(axis=1)
     order = np.argsort(-blame, kind="stable")[:n_most]
@@ -88,7 +88,7 @@ def _without(ring: Ring, index: int) -> Ring:
     return Ring(np.delete(ring.points, index, axis=0), ring.parent)
 
 
-def _grown(outline: Outline, disagreement: Disagreement, row: int, operator: str) -> Outline:
+def grown_at(outline: Outline, disagreement: Disagreement, row: int, operator: str) -> Outline:
     """One (edge_subdivide) or two (edge_extrude) vertices more in the boundary edge of that row."""
     loops = outline.loops
     a, b = loops.topology.boundary_half_edges[row].tolist()

@@ -25,8 +25,8 @@ class UnbuildableError(AutoPolyError):
     """A ring that the operators cannot reach without crossings."""
 
 
-class _Builder:
-    """The states of a construction in the making."""
+class Builder:
+    """The states of a construction in the making. Raises UnbuildableError for a start mesh that crosses itself."""
 
     def __init__(self, simulator: Simulator, start: PolyMesh) -> None:
         if not is_sane(start):
@@ -78,7 +78,7 @@ def construct(simulator: Simulator, rings: Sequence[Ring]) -> list[State]:
     if len(coarse) == 3:
         builder = _begin_with_triangle(simulator, main)
     else:
-        builder = _Builder(simulator, PolyMesh.from_faces(main[coarse], [tuple(range(len(coarse)))]))
+        builder = Builder(simulator, PolyMesh.from_faces(main[coarse], [tuple(range(len(coarse)))]))
         _refine(builder, main, order, coarse, list(range(len(coarse))))
     _cut_holes(builder, [r.points for r in rings if r.parent == 0])
     for index, ring in enumerate(rings):
@@ -101,7 +101,7 @@ def _peeled(points: FloatArray, walls: FloatArray, locked: Sequence[int], n_keep
     return order, [i for i in range(len(points)) if i not in set(order)]
 
 
-def _refine(builder: _Builder, points: FloatArray, order: list[int], coarse: list[int], ids: list[int]) -> None:
+def _refine(builder: Builder, points: FloatArray, order: list[int], coarse: list[int], ids: list[int]) -> None:
     """Subdivide back in, last dropped first, what was peeled off; `ids` are the vertex ids of `coarse`."""
     id_of = dict(zip(coarse, ids, strict=True))
     for index in reversed(order):
@@ -115,16 +115,16 @@ def _refine(builder: _Builder, points: FloatArray, order: list[int], coarse: lis
         id_of[index] = new_id
 
 
-def _begin_with_triangle(simulator: Simulator, points: FloatArray) -> _Builder:
+def _begin_with_triangle(simulator: Simulator, points: FloatArray) -> Builder:
     """A triangle: a quad with one corner in the middle of an edge, which then goes."""
     corners = np.insert(points, 1, 0.5 * (points[0] + points[1]), axis=0)
-    builder = _Builder(simulator, PolyMesh.from_faces(corners, [(0, 1, 2, 3)]))
+    builder = Builder(simulator, PolyMesh.from_faces(corners, [(0, 1, 2, 3)]))
     if "vertex_dissolve" in simulator.operators:
         builder.do("vertex_dissolve", 1)
     return builder
 
 
-def _cut_holes(builder: _Builder, holes: Sequence[FloatArray]) -> None:
+def _cut_holes(builder: Builder, holes: Sequence[FloatArray]) -> None:
     """Cut the holes that can be cut, the largest first; try the others again with what has been cut to tie them to."""
     if "face_hole" not in builder.simulator.operators:
         return
@@ -141,7 +141,7 @@ def _cut_holes(builder: _Builder, holes: Sequence[FloatArray]) -> None:
         waiting, n_before = failed, len(waiting)
 
 
-def _cut_hole(builder: _Builder, hole: FloatArray, others: Sequence[FloatArray]) -> None:
+def _cut_hole(builder: Builder, hole: FloatArray, others: Sequence[FloatArray]) -> None:
     face = _face_around(builder.mesh, hole)
     plan = plan_hole(builder.mesh, face, hole, obstacles=others)
     if plan is None:
@@ -177,7 +177,7 @@ def _ring_segments(points: FloatArray) -> FloatArray:
     return np.hstack((points, np.roll(points, -1, axis=0)))
 
 
-def _add_part(builder: _Builder, points: FloatArray) -> None:
+def _add_part(builder: Builder, points: FloatArray) -> None:
     """A part of its own: extrude twice, delete the quad between, refine."""
     operators = builder.simulator.operators
     if "edge_extrude" not in operators or "face_delete" not in operators:
@@ -187,14 +187,14 @@ def _add_part(builder: _Builder, points: FloatArray) -> None:
     if len(coarse) > 4 or (triangle and "vertex_dissolve" not in operators):
         raise UnbuildableError("the part cannot be coarsened to a quad")
     quad = np.insert(points, 1, 0.5 * (points[0] + points[1]), axis=0) if triangle else points[coarse]
-    ids = _grow_quad(builder, quad)
+    ids = grow_quad(builder, quad)
     if triangle:
         builder.do("vertex_dissolve", builder.mesh.vertex_index(ids[1]))
     else:
         _refine(builder, points, order, coarse, ids)
 
 
-def _grow_quad(builder: _Builder, quad: FloatArray) -> list[int]:
+def grow_quad(builder: Builder, quad: FloatArray) -> list[int]:
     """Make `quad` (4, 2) a part of its own; return the ids of its vertices in its order."""
     kept = len(builder.states)
     for a, b, turn in _ways_to_grow(builder.mesh, quad):
@@ -227,8 +227,8 @@ def _ways_to_grow(mesh: PolyMesh, quad: FloatArray) -> Iterator[tuple[int, int, 
         yield mesh.vertex_ids[a], mesh.vertex_ids[b], turn
 
 
-def _place_quad(builder: _Builder, quad: FloatArray) -> list[int]:
-    """As `_grow_quad` where nothing can be seen from the mesh: extrude two slivers, then move the second in place."""
+def _place_quad(builder: Builder, quad: FloatArray) -> list[int]:
+    """As `grow_quad` where nothing can be seen from the mesh: extrude two slivers, then move the second in place."""
     ends = builder.mesh.vertices[builder.mesh.topology.boundary_half_edges]
     longest = int(np.argmax(np.hypot(*(ends[:, 1] - ends[:, 0]).T)))
     a, b = builder.mesh.topology.boundary_half_edges[longest].tolist()

@@ -1,0 +1,101 @@
+"""`Partition`: an outline cut into convex quads and triangles, with as few faces as there can be.
+
+Without holes the cut is exact (dynamic programming over the diagonals). A hole is joined to what is around it by a
+bridge, which becomes an edge of the mesh; which bridges are best is searched from the shortest ones on.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from agents.quads import partition_kernels
+from agents.trace.outline import Outline
+from autopoly_env.arrays import FloatArray
+from autopoly_env.mesh import Face, PolyMesh, is_sane
+
+LEAST_SINE = 0.02  # of the turn at every corner of a face
+MOST_CORNERS = 160  # of one part and its holes that are cut exactly; the time grows with the fourth power
+BENT_SINE = 0.025  # what it is made by moving vertices
+MOST_BENT = 0.25  # of sine, by which a corner may lack that
+_N_ROUNDS = 60
+_MANY_HOLES = 4  # from which on one way is tried only
+_N_BRIDGES = 3  # ways to join a hole that are tried, the shortest first
+
+
+@dataclass(frozen=True)
+class Partition:
+    """The faces, as indices of the outline's vertices, ring after ring."""
+
+    faces: tuple[Face, ...]
+    cost: float  # elements that the faces add to the rings, with a little for ugly corners
+
+    @property
+    def n_quads(self) -> int:
+        return sum(len(face) == 4 for face in self.faces)
+
+
+def partitioned(outline: Outline, bend: float = 0.0) -> Partition | None:
+    """The best cut that was found; None where there is none. Corners of quads may lack so much sine."""
+    points = outline.loops.vertices
+    cycles = outline.loops.faces
+    faces: list[Face] = []
+    cost = 0.0
+    for k, ring in enumerate(outline.rings):
+        if ring.is_hole:
+            continue
+        holes = [cycles[h] for h, other in enumerate(outline.rings) if other.parent == k]
+        found = _best_of_part(points, cycles[k], holes, bend)
+        if found is None:
+            return None
+        faces += found.faces
+        cost += found.cost
+    return Partition(tuple(faces), cost)
+
+
+def least_faces(outline: Outline) -> int:
+    """How many faces there are at least: all of them quads, but one where the number of corners is odd."""
+    n_faces = 0
+    for k, ring in enumerate(outline.rings):
+        if not ring.is_hole:
+            holes = [other for other in outline.rings if other.parent == k]
+            n = len(ring.points) + sum(len(hole.points) for hole in holes)
+            n_faces += (n + 2 * len(holes) - 1) // 2
+    return n_faces
+
+
+def bent(mesh: PolyMesh) -> PolyMesh | None:
+    """The mesh with vertices moved so that all faces are convex; None where that takes too much."""
+    topology, points = mesh.topology, mesh.vertices.copy()
+    partition_kernels.bend(points, topology.corners, topology.face_offsets, BENT_SINE, _N_ROUNDS)
+    if partition_kernels.least_turn(points, topology.corners, topology.face_offsets) < LEAST_SINE:
+        return None
+    moved = mesh.with_vertices(np.clip(points, 0.0, 1.0))
+    return moved if is_sane(moved) else None
+
+
+def mesh_of(outline: Outline, partition: Partition) -> PolyMesh:
+    """The outline as a mesh of the partition's faces."""
+    return PolyMesh.from_faces(outline.loops.vertices, partition.faces)
+
+
+def _best_of_part(points: FloatArray, around: Face, holes: Sequence[Face], bend: float) -> Partition | None:
+    if len(around) + sum(map(len, holes)) + 2 * len(holes) > MOST_CORNERS:
+        return None
+    if not holes:
+        ways = iter([np.array(around)])
+    else:
+        flat, offsets = np.concatenate([np.array(hole) for hole in holes]), np.cumsum([0, *map(len, holes)])
+        ranks = range(_N_BRIDGES if len(holes) < _MANY_HOLES else 1)
+        ways = (partition_kernels.bridged(points, np.array(around), flat, offsets, rank) for rank in ranks)
+    best_cost, best_faces = np.inf, np.empty((0, 4), np.int64)
+    for polygon in ways:
+        if not len(polygon):
+            break
+        cost, faces = partition_kernels.cut(points, polygon, LEAST_SINE, bend)
+        if cost < best_cost:
+            best_cost, best_faces = cost, faces
+    if best_cost == np.inf:
+        return None
+    rows = [tuple(face[:-1]) if face[-1] < 0 else tuple(face) for face in best_faces.tolist()]
+    return Partition(tuple(rows), float(best_cost))

@@ -1,0 +1,108 @@
+"""In which order a mesh of quads and triangles is modelled, and with which operators.
+
+It begins with the largest face. Every further face hangs on an edge that is there already: a new quad is an extrusion, a
+new triangle a cap; a face whose corners are all there closes a ring and is filled in. Branches are followed to their end
+before the next one begins, and rings are closed last, so that whoever follows never goes back.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from autopoly_env.arrays import FloatArray
+from autopoly_env.mesh import Face, PolyMesh
+
+BODY = "body"
+
+
+@dataclass(frozen=True)
+class Addition:
+    """A face in its turn: what it hangs on, and what is there of it."""
+
+    face: Face  # begins with the edge a, b that it hangs on, as that face runs: the neighbour has b, a
+    kind: str  # "extrude", "cap", "fill", "weld": what makes it; "apart": a part of its own
+    part: int  # number of the branch that it belongs to, 0 for the body
+
+
+def order_of(mesh: PolyMesh) -> Iterator[Addition]:
+    """The faces of a mesh in the order in which they are modelled; each part of the mesh after the other."""
+    areas = mesh.face_areas()
+    waiting = set(range(len(mesh.faces)))
+    n_parts = 0
+    while waiting:
+        quads = [f for f in waiting if len(mesh.faces[f]) == 4]
+        start = max(quads or waiting, key=lambda f: (areas[f], -f))
+        yield Addition(mesh.faces[start], "start" if len(waiting) == len(mesh.faces) else "apart", n_parts)
+        for addition in _outwards(mesh, start, areas, waiting, n_parts):
+            n_parts = max(n_parts, addition.part)
+            yield addition
+        n_parts += 1
+
+
+def _outwards(
+    mesh: PolyMesh, start: int, areas: FloatArray, waiting: set[int], first_part: int
+) -> Iterator[Addition]:
+    """The faces that hang together with `start`, taken out of `waiting`."""
+    sides = {pair: f for f, face in enumerate(mesh.faces) for pair in pairwise((*face, face[0]))}
+    built_edges: set[tuple[int, int]] = set()  # as the built faces run
+    built_vertices: set[int] = set()
+    branch_of = {start: first_part}
+    age: dict[int, int] = {}
+    n_branches = first_part
+
+    def build(f: int) -> None:
+        waiting.discard(f)
+        age[f] = len(age)
+        built_edges.update(pairwise((*mesh.faces[f], mesh.faces[f][0])))
+        built_vertices.update(mesh.faces[f])
+
+    build(start)
+    while True:
+        ways = []
+        for (a, b), f in sides.items():
+            neighbour = sides.get((b, a))
+            if f in waiting and neighbour in age:
+                kind = _kind(mesh.faces[f], (a, b), built_edges, built_vertices)
+                ways.append((_RANK[kind], -age[neighbour], -areas[f], f, (a, b), kind, neighbour))
+        if not ways:
+            return
+        _, _, _, f, (a, b), kind, neighbour = min(ways)
+        branch = branch_of[neighbour]
+        if neighbour == start:
+            n_branches += 1
+            branch = n_branches
+        branch_of[f] = branch
+        build(f)
+        yield Addition(_turned(mesh.faces[f], a, b), kind, branch)
+
+
+_RANK = {"extrude": 0, "cap": 0, "fill": 1, "weld": 2}
+
+
+def _kind(
+    face: Face, base: tuple[int, int], built_edges: set[tuple[int, int]], built_vertices: set[int]
+) -> str:
+    """What makes a face that hangs on the edge `base` of its own."""
+    others = [v for v in face if v not in base and v in built_vertices]
+    if not others:
+        return "extrude" if len(face) == 4 else "cap"
+    if len(others) < len(face) - 2:
+        return "weld"
+    around = list(pairwise((*face, face[0])))
+    there = [(a, b) for a, b in around if (b, a) in built_edges and (a, b) != base]
+    if len(face) == 3:
+        return "fill" if there else "weld"
+    opposite = around[(around.index(base) + 2) % 4]
+    return "fill" if opposite in there else "weld"
+
+
+def _turned(face: Face, a: int, b: int) -> Face:
+    """The face with its corners from a, b on."""
+    k = face.index(a)
+    turned = (*face[k:], *face[:k])
+    assert turned[1] == b
+    return turned
+
+
