@@ -8,11 +8,9 @@ for a softmax of r_all over a temperature is exact. Letters: A actions, K operat
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from agents.guided.measures import candidate_arrays
 from agents.guided.nfap import Foresight, NfapNet, candidates_of
@@ -21,7 +19,7 @@ from agents.guided.warp import WarpNet
 from agents.guided.weights import NetworkMeta
 from agents.search.batched import BatchedEvaluator
 from agents.search.evaluator import ResidualEvaluator
-from autopoly_env.arrays import FloatArray
+from autopoly_env.arrays import AnyArray, FloatArray
 from autopoly_env.errors import IllegalActionError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import Action, Choice, operator_named
@@ -133,7 +131,7 @@ class WarpEvaluator(NfapEvaluator):
         return [mesh.with_vertices(row[: len(mesh.vertices)]) for row, mesh in zip(carried, meshes, strict=True)]
 
 
-def _padded(arrays: Sequence[NDArray[Any]], padding: int) -> torch.Tensor:
+def _padded(arrays: Sequence[AnyArray], padding: int) -> torch.Tensor:
     """Arrays (n, 2) of different lengths as one tensor (B, longest, 2)."""
     batch = np.full((len(arrays), max(map(len, arrays)), 2), padding, arrays[0].dtype)
     for row, array in zip(batch, arrays, strict=True):
