@@ -114,7 +114,7 @@ class WarpEvaluator(NfapEvaluator):
                     yield action, start.choice, start.mesh
                 else:
                     operator = operator_named(action.operator)
-                    choice = operator.choose(state.mesh, action.element)
+                    choice = operator.choice_at(state.mesh, action.element)
                     yield action, choice, operator.apply(state.mesh, action.element, choice)
             except IllegalActionError:
                 continue
