@@ -60,8 +60,8 @@ class NfapEvaluator(BatchedEvaluator[Foresight]):
 
     def _extra_price(self, simulator: Simulator, actions: Sequence[Action]) -> FloatArray:
         """(A,) what the elements that each action adds cost more than in training, in units of the labels' softmax."""
-        dearer = (simulator.weights.w_sc - self._trained_w_sc) / self._label_temperature
-        return dearer * np.array([float(sum(_changes(action))) for action in actions])
+        price_change = (simulator.weights.w_sc - self._trained_w_sc) / self._label_temperature
+        return price_change * np.array([float(sum(_changes(action))) for action in actions])
 
     def _evaluate(self, simulator: Simulator, states: Sequence[State]) -> Iterable[Foresight]:
         """The first stage of what the network foresees."""
