@@ -59,7 +59,7 @@ class Outcome:
     n_actions: int  # of the construction sequence
     n_refits: int
     seconds: float
-    stopped_by: str  # as in `agents.base.Stats`
+    stopped_by: str  # as in `agents.solution.Stats`
     curve: list[tuple[int, float, float]]  # refits, seconds, best r_all so far, at the resolution of the search
     mesh: MeshData
     valid: float | None = None  # these three as in `autopoly_env.sequence.Lesson`; older records have none

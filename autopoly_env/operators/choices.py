@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
+from autopoly_env.arguments import first_defect, shortened
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import SequenceError
 from autopoly_env.mesh import PolyMesh
@@ -60,7 +61,7 @@ def _corner_choice(mesh: PolyMesh, corner: int, ids: ChoiceIds) -> Choice:
         raise SequenceError(f"choice {ids}: expected the vertex to split to, {{'to': id}}")
     to = ids["to"]
     if isinstance(to, bool) or not isinstance(to, int) or to < 0:
-        raise SequenceError(f"choice.to is {_short(to)}; give an id, an integer from 0")
+        raise SequenceError(f"choice.to is {shortened(to)}; give an id, an integer from 0")
     links = mesh.topology.links
     face = links.faces[corner]
     return links.offsets[face] + corner_position(mesh, face, to)
@@ -79,8 +80,9 @@ def _hole_choice(mesh: PolyMesh, hole: int, ids: ChoiceIds) -> Choice:
     try:
         plan = _HOLE.validate_python(ids)
     except ValidationError as error:
-        defect = error.errors(include_url=False)[0]
-        raise SequenceError(f"choice.{'.'.join(map(str, defect['loc'])) or 'all of it'}: {defect['msg']}") from None
+        defect = first_defect(error)
+        place = ".".join(("choice", *map(str, defect.place or ("all of it",))))
+        raise SequenceError(f"{place}: {defect.problem}") from None
     (a, i), (b, j) = plan.bridges
     face, _ = hole_face(hole)
     return HoleChoice(plan.points, ((corner_position(mesh, face, a), i), (corner_position(mesh, face, b), j)))
@@ -93,11 +95,6 @@ def _renamed_hole(ids: ChoiceIds, renaming: Renaming) -> ChoiceIds:
         placed = placed[::-1]
         bridges = [(name, len(placed) - 1 - corner) for name, corner in bridges]
     return {"points": placed, "bridges": bridges}
-
-
-def _short(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 40 else text[:37] + "..."
 
 
 TO_CORNER = ChoiceCodec(_corner_choice_ids, _corner_choice, lambda ids, r: {"to": r.vertex(ids["to"])})

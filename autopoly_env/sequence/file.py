@@ -8,7 +8,7 @@ from typing import Annotated, Any, NoReturn
 import numpy as np
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
-from autopoly_env.arguments import first_defect
+from autopoly_env.arguments import first_defect, shortened
 from autopoly_env.errors import MeshError, SequenceError
 from autopoly_env.mesh import PolyMesh, Topology, validate
 
@@ -90,9 +90,9 @@ def parse_json(text: str) -> tuple[dict[str, Any], PolyMesh, Score, tuple[Step, 
         raise SequenceError(f"not JSON ({_one_line(error)}); give a construction sequence as saved") from None
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         found = data.get("format") if isinstance(data, dict) else data
-        raise SequenceError(f"the format is {_short(found)}, not {FORMAT!r}; give a construction sequence")
+        raise SequenceError(f"the format is {shortened(found)}, not {FORMAT!r}; give a construction sequence")
     if data.get("version") != VERSION:
-        raise SequenceError(f"the version is {_short(data.get('version'))}; this release reads version {VERSION}")
+        raise SequenceError(f"the version is {shortened(data.get('version'))}; this release reads version {VERSION}")
     try:
         document = _DOCUMENT.validate_python(data)
     except ValidationError as error:
@@ -169,8 +169,3 @@ def _refuse_number(name: str) -> NoReturn:
 
 def _one_line(error: BaseException) -> str:
     return " ".join(str(error).split())
-
-
-def _short(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 40 else text[:37] + "..."

@@ -187,7 +187,7 @@ class ConstructionSequence:
 def _record_step(mesh: PolyMesh, action: Action, choice: Choice | None, after: PolyMesh, score: Score) -> Step:
     operator, element = operator_named(action.operator), int(action.element)
     if choice is None:
-        choice = operator.choose(mesh, element)
+        choice = operator.choice_at(mesh, element)
     made = operator.apply(mesh, element, choice)
     if made.with_vertices(after.vertices) != after:
         raise SequenceError(f"the mesh after it is not what {action.operator} makes; record every action")
