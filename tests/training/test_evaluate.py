@@ -123,7 +123,8 @@ def test_run_folder__has_the_suite_the_targets_and_whole_lines(run: Run) -> None
     assert sorted(os.listdir("out/targets")) == [f"{name}.png" for name in names]
     assert list(lines("out")[0]) == [
         *("agent", "target", "seed", "r_sm", "r_sc", "r_si", "r_all", "V", "E", "F", "flipped_faces"),
-        *("n_actions", "n_refits", "seconds", "stopped_by", "curve", "mesh", "valid", "blocking_in", "moved", "error"),
+        *("n_actions", "n_refits", "seconds", "stopped_by", "curve", "mesh", "valid", "blocking_in", "moved"),
+        *("quads", "ngons", "concave", "effort", "returns", "error"),
     ]
     assert all(line["curve"] for line in lines("out") if line["agent"] == "trace")
     assert not any(line["curve"] for line in lines("out") if line["agent"] == "thrifty")  # on another scale
