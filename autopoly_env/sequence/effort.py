@@ -12,7 +12,7 @@ from autopoly_env.arrays import FloatArray
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators.wording import Gesture
 from autopoly_env.sequence.file import Step
-from autopoly_env.sequence.ids import decoded
+from autopoly_env.sequence.ids import decoded, operator_named
 from autopoly_env.sequence.sequence import ConstructionSequence
 
 SECONDS = {"K": 0.28, "P": 1.1, "B": 0.1, "M": 1.35}  # a key, pointing, a button down or up, getting ready
@@ -29,22 +29,26 @@ def effort(sequence: ConstructionSequence) -> float:
 
 
 def seconds_of(step: Step, before: PolyMesh, after: PolyMesh) -> float:
-    """Seconds for a step from `before` to `after`: selecting, the operator's gesture, moving.
+    """Seconds for a step from `before` to `after`: selecting, the operator's gesture, moving."""
+    gesture = operator_named(step.operator).told.gesture(step)
+    return time_of((_selected(gesture), gesture.strokes, *map(_move, groups_to_move(step, before, after))))
 
-    Vertices that go the same way (within `ALIKE`) are selected and moved together. What the operator itself puts in its
-    place costs nothing, and what it drags goes one common way for nothing: the one after which least is left to move.
+
+def groups_to_move(step: Step, before: PolyMesh, after: PolyMesh) -> list[list[int]]:
+    """The vertices of `after`, by index, that are left to be moved by hand after the operator, those together that go
+    the same way (within `ALIKE`).
+
+    What the operator itself puts in its place is not among them, and what it drags goes one common way of its own: the
+    one after which the rest takes least.
     """
     operator, element, choice = decoded(before, step)
     made = operator.apply(before, element, choice)
-    gesture = operator.told.gesture(step)
     ways = after.vertices - made.vertices
-    variants = [ways]
     new = [after.vertex_index(name) for name in step.created["vertices"]]
-    if gesture.drags and new:
-        ways[new] = after.vertices[new] - operator.sources_of(before, element, choice, made)
-        variants = [_dragged(ways, new, way) for way in ways[new]]
-    moving = min(time_of(_moves(left)) for left in variants)
-    return time_of((_selected(gesture), gesture.strokes)) + moving
+    if not (operator.told.gesture(step).drags and new):
+        return _groups(ways)
+    ways[new] = after.vertices[new] - operator.sources_of(before, element, choice, made)
+    return min((_groups(_dragged(ways, new, way)) for way in ways[new]), key=lambda groups: time_of(map(_move, groups)))
 
 
 def time_of(strokes: Iterable[str]) -> float:
@@ -64,14 +68,16 @@ def _dragged(ways: FloatArray, new: list[int], way: FloatArray) -> FloatArray:
     return left
 
 
-def _moves(ways: FloatArray) -> list[str]:
-    """The strokes for vertices that have to go `ways` (V, 2), a text for every group that goes alike.
-
-    A group is what goes as its first vertex does, in the order of the vertices.
-    """
-    left, moves = ways[np.hypot(*ways.T) > ALIKE], []
+def _groups(ways: FloatArray) -> list[list[int]]:
+    """The vertices that have to go `ways` (V, 2); a group is what goes as its first vertex does, in their order."""
+    left, groups = np.flatnonzero(np.hypot(*ways.T) > ALIKE), []
     while len(left):
-        is_alike = np.hypot(*(left - left[0]).T) <= ALIKE
-        moves.append(_CLICK + (int(is_alike.sum()) - 1) * _FURTHER + _MOVE)
+        is_alike = np.hypot(*(ways[left] - ways[left[0]]).T) <= ALIKE
+        groups.append(left[is_alike].tolist())
         left = left[~is_alike]
-    return moves
+    return groups
+
+
+def _move(group: list[int]) -> str:
+    """The strokes that select a group of vertices and move it."""
+    return _CLICK + (len(group) - 1) * _FURTHER + _MOVE
