@@ -120,13 +120,14 @@ def solve(
 ) -> int:
     """Check everything that can be checked before the work, then do it; return the exit code."""
     from agents.budget import Budget
-    from agents.commands.report import Report, read_columns
+    from agents.commands.columns import read_columns
+    from agents.commands.report import COLUMNS, FORMATS, Report
     from agents.commands.results import claim_folder
     from agents.commands.solving import Settings, name_jobs, solve_all
     from agents.commands.wishes import read_wishes
     from autopoly_env.score import ScoreWeights
 
-    shown = read_columns(columns)
+    shown = read_columns(columns, FORMATS, COLUMNS)
     weights = ScoreWeights(w_sm, w_sc, w_si, w_locality)
     budget = Budget(refits, seconds, simulations)
     wishes = read_wishes(importance, start, lock, symmetry)

@@ -10,9 +10,9 @@ from rich.table import Table
 from rich.text import Text
 
 from agents import budget
+from agents.commands.columns import LESSON
 from agents.commands.progress import TASK, progress_bar
 from agents.commands.results import Result
-from autopoly_env.errors import ConfigError
 from autopoly_env.sequence import Lesson
 
 FORMATS = {  # of the numbers that a table can show, each and as a mean
@@ -36,27 +36,10 @@ FORMATS = {  # of the numbers that a table can show, each and as a mean
     "seconds": (".2f", ".2f"),
 }
 COLUMNS = ("r_sm", "r_sc", "r_si", "r_all", "actions", "valid", "blocking_in", "moved", "refits", "seconds")
-LESSON = ("actions", "valid", "blocking_in", "moved", "quads", "ngons", "concave", "effort", "returns")
 WARNING = "warning:"
 MOST_NOTES = 8  # lines of notes below a table
 MOST_NAMES = 4  # names of images in such a line
 PLAIN_WIDTH = 120  # of a table that goes to a file
-
-
-def read_columns(given: str) -> tuple[str, ...]:
-    """The columns that are asked for, `quads,effort` or `lesson` for those of a construction; without any, COLUMNS.
-
-    Raises ConfigError for a name that is none and for one that stands there twice.
-    """
-    names: list[str] = []
-    for name in given.split(",") if given else COLUMNS:
-        names += LESSON if name.strip() == "lesson" else (name.strip(),)
-    for name in names:
-        if name not in FORMATS:
-            raise ConfigError(f"--columns {given}: {name!r} is none; give some of lesson, {', '.join(FORMATS)}")
-        if names.count(name) > 1:
-            raise ConfigError(f"--columns {given}: {name} stands there twice; name it once")
-    return tuple(names)
 
 
 class Report:

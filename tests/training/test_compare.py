@@ -19,6 +19,7 @@ from training.records import MeshData, Outcome, Record, RunInfo, target_path
 from training.report.axes import x_axis, y_axis
 from training.report.comparison import read_runs, rows_of
 from training.report.gallery import worst_cards
+from training.report.lessons import lesson_rows, lessons_markdown
 from training.report.statistics import bootstrap_mean
 
 NASTY = '</script><b>"it\'s" & `${1}`\n|x|'
@@ -143,6 +144,21 @@ def test_axis__places_by_the_logarithm_and_keeps_what_is_beyond_at_its_end() -> 
     assert y_axis(0.0, 1.0).ticks() == pytest.approx([0.0, 0.2, 0.4, 0.6, 0.8, 1.0])
     assert x_axis(-0.5, 1.5, is_whole=True).ticks() == [0.0, 1.0]
     assert len(x_axis(3.0, 3.0).ticks()) > 1
+
+
+def test_lessons__are_means_over_the_targets_of_which_they_are_known(tmp_path: Path) -> None:
+    told = [replace(outcome(50.0), effort=seconds, returns=0, quads=1.0) for seconds in (10.0, 20.0)]
+    records = [Record("a", name, 0, one) for name, one in zip("xy", told, strict=True)]
+    records += records_of("a", {"z": 50.0}) + records_of("older", {"x": 1.0, "y": 2.0})
+    first, older = rows_of(read_runs([write_run(tmp_path / "run", records)]))
+    assert first.means["effort"].mean == 15.0 and first.means["quads"] == pytest.approx((1.0, 1.0, 1.0))
+    assert np.isnan(first.means["moved"].mean) and np.isnan(older.means["effort"].mean)
+    assert first.means["actions"].mean == 0.0
+    assert [i for i, _ in lesson_rows([older, first])] == [1]
+    assert lessons_markdown([older]) == ""
+    heads, _, line = lessons_markdown([older, first]).splitlines()[-3:]
+    cells = dict(zip(heads.split(" | "), line.split(" | "), strict=True))
+    assert (cells["| agent"], cells["effort"], cells["moved"], cells["quads"]) == ("| a", "15.0", "–", "1.00")
 
 
 # --- the command

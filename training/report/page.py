@@ -11,7 +11,9 @@ from training.report.charts import Curves, anytime, curves_of, scatter, scatter_
 from training.report.comparison import MEANS, Comparison, Row
 from training.report.gallery import Card, gallery_of, worst_cards
 from training.report.headline import page_table
+from training.report.lessons import lesson_rows
 from training.report.rendering import own_text, render
+from training.report.table import LESSON_FORMATS
 
 WORK = ("refits", "seconds")
 COMPLEXITY = ("r_sc", "r_si")
@@ -32,6 +34,8 @@ def page_html(comparison: Comparison, rows: Sequence[Row], n_cards: int, title: 
         labels=labels,
         baseline=labels[comparison.baseline],
         table=page_table(rows, comparison.baseline),
+        lessons=lesson_rows(rows),
+        lesson_formats=LESSON_FORMATS,
         scatters=[scatter(comparison, value) for value in COMPLEXITY],
         n_shown=len(scatter_points(comparison)),
         n_outcomes=sum(len(series.outcomes) for series in comparison.series),
