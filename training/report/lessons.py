@@ -14,19 +14,16 @@ EXPLAINED = (
 )
 
 
-def lesson_rows(rows: Sequence[Row]) -> list[tuple[int, Row]]:
-    """The rows of which more is known than the number of actions, which is all that the oldest records tell.
-
-    Each comes with its number among all.
-    """
-    names = [name for name in LESSON_FORMATS if name != "actions"]
-    return [(i, row) for i, row in enumerate(rows) if any(math.isfinite(row.means[name].mean) for name in names)]
+def is_told(row: Row) -> bool:
+    """Whether more is known than the number of actions, which is all that the oldest records tell."""
+    return any(math.isfinite(row.means[name].mean) for name in LESSON_FORMATS if name != "actions")
 
 
 def lessons_markdown(rows: Sequence[Row]) -> str:
     """The table as Markdown, below its explanation; empty where nothing is known."""
     lines = [
         Line([Cell(row.label), *(mean_cell(row.means[name], form, None) for name, form in LESSON_FORMATS.items())])
-        for _, row in lesson_rows(rows)
+        for row in rows
+        if is_told(row)
     ]
     return f"{EXPLAINED}\n\n{as_markdown(HEADS, lines)}" if lines else ""
