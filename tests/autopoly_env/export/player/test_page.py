@@ -22,6 +22,7 @@ from autopoly_env.silhouette import Silhouette
 from tests.helpers.constructions import TOTALS, house, score
 from tests.helpers.drawings import HOUSE, painted
 from tests.helpers.player import HOSTILE, wanted
+from tests.helpers.tables import table
 
 
 class Reader(HTMLParser):
@@ -70,6 +71,19 @@ def test_page__tells_where_new_vertices_grow_from_and_lost_ones_go() -> None:
     along, way = np.array((0.15, 0.45)), np.array((0.125, 0.0))
     np.testing.assert_allclose(steps[5]["lost"]["5"], (0.75, 0.25) + along * (way @ along) / (along @ along), atol=1e-5)
     assert [step["moved"] for step in steps[1:4]] == [[4], [], [3, 6]]
+
+
+def test_page__names_parts_and_tells_what_steps_take_by_hand() -> None:
+    data = data_of(to_html(table()))
+    assert [step["part"] for step in data["steps"][1:]] == ["body", "body", "lower right, 1 of 2", "lower left, 2 of 2"]
+    assert [step["seconds"] for step in data["steps"][1:]] == [7.03, 7.03, 4.23, 4.23]
+    assert data["lesson"] == ["23 s by hand", "3 parts", "0 returns", "67 % quads", "1 n-gon"]
+    cut, leg = data["steps"][1]["keys"], data["steps"][3]["keys"]
+    assert cut[-1].startswith("`G`") and leg[-1] == "`E`: pull the new edge out, click"  # which puts it in its place
+
+
+def test_page__of_one_part_says_nothing_of_parts() -> None:
+    assert data_of(to_html(house(2)))["lesson"] == ["12 s by hand", "50 % quads"]
 
 
 def test_page__asks_for_nothing_from_outside() -> None:
