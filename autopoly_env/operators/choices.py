@@ -11,7 +11,7 @@ from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import SequenceError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators.action import Choice
-from autopoly_env.operators.elements import corner_position, hole_face
+from autopoly_env.operators.elements import EDGE, corner_position, hole_face
 from autopoly_env.operators.holes import HoleChoice
 
 ChoiceIds = dict[str, Any]
@@ -66,6 +66,22 @@ def _corner_choice(mesh: PolyMesh, corner: int, ids: ChoiceIds) -> Choice:
     return links.offsets[face] + corner_position(mesh, face, to)
 
 
+def _edge_choice_ids(mesh: PolyMesh, _edge: int, choice: Choice) -> ChoiceIds:
+    assert isinstance(choice, int | np.integer)
+    return {"to": [mesh.vertex_ids[v] for v in mesh.edges[int(choice)]]}
+
+
+def _edge_choice(mesh: PolyMesh, _edge: int, ids: ChoiceIds) -> Choice:
+    match ids:
+        case {"to": [int(a), int(b)], **rest} if not rest and not isinstance(a, bool) and not isinstance(b, bool):
+            return EDGE.index(mesh, {"edge": [a, b]})
+    raise SequenceError(f"choice {_short(ids)}: expected the ends of the edge to fill to, {{'to': [id, id]}}")
+
+
+def _renamed_edge(ids: ChoiceIds, renaming: Renaming) -> ChoiceIds:
+    return {"to": [renaming.vertex(name) for name in ids["to"]]}
+
+
 def _hole_choice_ids(mesh: PolyMesh, hole: int, choice: Choice) -> ChoiceIds:
     assert isinstance(choice, HoleChoice)
     face = mesh.faces[hole_face(hole)[0]]
@@ -101,4 +117,5 @@ def _short(value: object) -> str:
 
 
 TO_CORNER = ChoiceCodec(_corner_choice_ids, _corner_choice, lambda ids, r: {"to": r.vertex(ids["to"])})
+TO_EDGE = ChoiceCodec(_edge_choice_ids, _edge_choice, _renamed_edge)
 OF_HOLE = ChoiceCodec(_hole_choice_ids, _hole_choice, _renamed_hole)
