@@ -90,11 +90,19 @@ def edge_fill() -> Example:
     return Example(mesh, mesh.edge_index(4, 5), Highlight(edges=((4, 5), (6, 7))))
 
 
+def vertex_merge() -> Example:
+    """A roof is closed: the ends of its two sides become one vertex."""
+    corners = [(0.1, 0.6), (0.5, 0.6), (0.9, 0.6), (0.9, 0.9), (0.5, 0.9), (0.1, 0.9), (0.3, 0.15), (0.62, 0.15)]
+    mesh = PolyMesh.from_faces(corners, [(0, 1, 4, 5), (1, 2, 3, 4), (0, 6, 1), (1, 7, 2)])
+    ends = Highlight(vertices=(6, 7), edges=((1, 6), (1, 7)))
+    return Example(mesh, 6, ends, Highlight(vertices=(7,), edges=((1, 7),)))
+
+
 EXAMPLES: dict[str, Callable[[], Example]] = {
     example.__name__: example
     for example in (
         *(edge_subdivide, edge_extrude, face_split, face_delete, face_hole, vertex_dissolve, edge_dissolve),
-        *(edge_cap, edge_fill),
+        *(edge_cap, edge_fill, vertex_merge),
     )
 }
 

@@ -66,6 +66,18 @@ def _corner_choice(mesh: PolyMesh, corner: int, ids: ChoiceIds) -> Choice:
     return links.offsets[face] + corner_position(mesh, face, to)
 
 
+def _vertex_choice_ids(mesh: PolyMesh, _vertex: int, choice: Choice) -> ChoiceIds:
+    assert isinstance(choice, int | np.integer)
+    return {"to": mesh.vertex_ids[int(choice)]}
+
+
+def _vertex_choice(mesh: PolyMesh, _vertex: int, ids: ChoiceIds) -> Choice:
+    match ids:
+        case {"to": int(to), **rest} if not rest and not isinstance(to, bool):
+            return mesh.vertex_index(to)
+    raise SequenceError(f"choice {_short(ids)}: expected the vertex to merge with, {{'to': id}}")
+
+
 def _edge_choice_ids(mesh: PolyMesh, _edge: int, choice: Choice) -> ChoiceIds:
     assert isinstance(choice, int | np.integer)
     return {"to": [mesh.vertex_ids[v] for v in mesh.edges[int(choice)]]}
@@ -117,5 +129,6 @@ def _short(value: object) -> str:
 
 
 TO_CORNER = ChoiceCodec(_corner_choice_ids, _corner_choice, lambda ids, r: {"to": r.vertex(ids["to"])})
+TO_VERTEX = ChoiceCodec(_vertex_choice_ids, _vertex_choice, lambda ids, r: {"to": r.vertex(ids["to"])})
 TO_EDGE = ChoiceCodec(_edge_choice_ids, _edge_choice, _renamed_edge)
 OF_HOLE = ChoiceCodec(_hole_choice_ids, _hole_choice, _renamed_hole)

@@ -25,6 +25,9 @@ CHAPEL: tuple[tuple[str, Mapping[str, Any], Mapping[str, Any] | None, Mapping[in
     ("edge_cap", {"edge": [0, 1]}, None, {4: (0.5, 0.125)}),
     ("edge_cap", {"edge": [1, 2]}, None, {5: (0.9, 0.4)}),
     ("edge_fill", {"edge": [1, 4]}, {"to": [1, 5]}, {}),
+    ("edge_extrude", {"edge": [2, 3]}, None, {6: (0.7, 0.85), 7: (0.3, 0.9)}),
+    ("edge_extrude", {"edge": [2, 5]}, None, {8: (0.95, 0.6), 9: (0.85, 0.85)}),
+    ("vertex_merge", {"vertex": 9}, {"to": 6}, {}),
 )
 
 

@@ -136,6 +136,11 @@ def edge_fill(a: int, b: int, c: int, d: int) -> None:
     name_new("face", made[0])
 
 
+def vertex_merge(name: int, other: int) -> None:
+    """A vertex merged into another one, which stays where it is."""
+    bmesh.ops.weld_verts(bm, targetmap={vertex(name): vertex(other)})
+
+
 def face_split(name: int, a: int, b: int) -> None:
     """A face cut from corner a to corner b; the part that runs counter-clockwise from a to b is the new one."""
     new, _, _ = cut(face(name), vertex(a), vertex(b))

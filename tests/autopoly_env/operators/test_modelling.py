@@ -86,3 +86,45 @@ def test_edge_fill__refuses_what_makes_no_mesh() -> None:
     pinched = PolyMesh.from_faces([(0, 0), (1, 0), (0, 1), (-1, 0), (0, -1)], [(0, 1, 2), (0, 3, 4)])
     ways = [pinched.edge_index(0, v) for v in (1, 3)]  # both run from the pinch
     assert "runs from or to the same vertex" in refusal("edge_fill", pinched, *ways)
+
+
+def bent() -> PolyMesh:
+    """Three quads around a missing one: 2 and 6 are the ends of the corner at 4."""
+    return apply("face_delete", PolyMesh.grid(2, 0.0, 0.0, 1.0, 1.0), 3)
+
+
+def test_vertex_merge__closes_a_corner_where_the_other_vertex_is() -> None:
+    mesh = bent()
+    assert mesh.vertex_ids == (0, 1, 2, 3, 4, 5, 6, 7)
+    made = apply("vertex_merge", mesh, 5, 7)
+    assert made.vertex_ids == (0, 1, 2, 3, 4, 6, 7)
+    assert made.counts == (7, 9, 3)
+    assert [[made.vertex_ids[v] for v in face] for face in made.faces] == [[0, 1, 4, 3], [1, 2, 7, 4], [3, 4, 7, 6]]
+    assert made.vertices[6].tolist() == mesh.vertices[7].tolist()
+    assert OPERATORS["vertex_merge"].choose(mesh, 5) == 7
+    assert OPERATORS["vertex_merge"].choose(mesh, 7) == 5
+    assert legal("vertex_merge", mesh) == [5, 7]
+
+
+def test_vertex_merge__closes_a_hole_of_four_corners_to_two_edges() -> None:
+    mesh = apply("face_delete", grid(), 4)
+    made = apply("vertex_merge", mesh, 5, 10)
+    assert np.subtract(made.counts, mesh.counts).tolist() == [-1, -2, 0]
+    assert (made.topology.n_holes, made.topology.is_boundary_vertex.sum()) == (0, 12)
+
+
+def test_vertex_merge__refuses_what_makes_no_mesh() -> None:
+    mesh = bent()
+    for other in (5, 4, 2):
+        assert "is a corner of the same face" in refusal("vertex_merge", mesh, 5, other)
+    assert "they would only touch" in refusal("vertex_merge", mesh, 0, 7)
+    assert "of more than two faces" in refusal("vertex_merge", grid(), 1, 9)
+    assert "no missing corner lies between" in refusal("vertex_merge", mesh, 0)
+    for other in (-1, 8, "6"):
+        assert "is no vertex" in refusal("vertex_merge", mesh, 5, other)
+
+
+def test_vertex_merge__leaves_some_boundary() -> None:
+    corners = [(0, 0), (1, 0), (1, 1), (0, 1), (0.3, 0.3), (0.7, 0.3), (0.7, 0.7), (0.3, 0.7)]
+    inset = PolyMesh.from_faces(corners, [(k, (k + 1) % 4, 4 + (k + 1) % 4, 4 + k) for k in range(4)] + [(4, 5, 6, 7)])
+    assert "no boundary would be left" in refusal("vertex_merge", inset, 0, 2)

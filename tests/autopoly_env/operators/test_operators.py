@@ -356,7 +356,7 @@ def test_preset__takes_a_name_or_a_list() -> None:
     ]  # fmt: skip
     assert preset("full") == tuple(OPERATORS.values())[:7] == PRESETS["full"]
     assert [operator.name for operator in preset("modeller")] == [
-        "edge_extrude", "edge_cap", "edge_fill", "face_delete", "vertex_dissolve", "edge_dissolve",
+        "edge_extrude", "edge_cap", "edge_fill", "vertex_merge", "face_delete", "vertex_dissolve", "edge_dissolve",
     ]  # fmt: skip
     assert preset("face_hole, edge_extrude") == (OPERATORS["face_hole"], OPERATORS["edge_extrude"])
     assert preset(["paper", OPERATORS["face_hole"]]) == (*PRESETS["paper"], OPERATORS["face_hole"])
@@ -367,10 +367,7 @@ def test_preset__takes_a_name_or_a_list() -> None:
         with pytest.raises(ConfigError, match="edge_extrude stands there twice"):
             preset(wrong)
     for wrong in ("no.such.module:edge_cut", "autopoly_env.errors:edge_cut", "autopoly_env.errors:MeshError", ":"):
-        with pytest.raises(
-            ConfigError,
-            match=r"module:name of an Operator|there is no module no;|expected an autopoly_env.operators.Operator",
-        ):
+        with pytest.raises(ConfigError, match=r"^operator '|expected an autopoly_env.operators.Operator"):
             preset(wrong)
 
 
@@ -406,6 +403,10 @@ def expected_effect(transition: Transition) -> tuple[int, int, int]:
         return len(stay[0]) - mesh.counts[0], len(stay[1]) - mesh.counts[1], -1
     if name == "edge_fill":
         return 0, n_new_sides(mesh, transition.made.faces[-1]), 1
+    if name == "vertex_merge":
+        choice = OPERATORS[name].choose(mesh, element) if transition.choice is None else transition.choice
+        ends = [{u for e in mesh.edges.tolist() for u in e if v in e and u != v} for v in (element, choice)]
+        return -1, -len(ends[0] & ends[1]), 0
     return EFFECTS[name]
 
 
