@@ -38,9 +38,10 @@ def check_operator(operator: Operator, meshes: Iterable[PolyMesh] | None = None)
 
     Rules: the mask has one bool per element and says where `apply` works; elsewhere it raises IllegalActionError. The
     mesh that comes out is valid; V - E + F is components - holes; (V, E, F) change by `changes` at most, an increase
-    exactly; ids are never reused and what survives keeps its id; the same input gives the same mesh and is not touched.
-    A step of it, written as JSON, replays to the same mesh; what does not show leaves the rendering as it is; new
-    vertices come from somewhere; there are words for it; the mirror image of a symmetric mesh's action is one.
+    exactly, or by `varies` at most; ids are never reused and what survives keeps its id; the same input gives the same
+    mesh and is not touched. A step of it, written as JSON, replays to the same mesh; what does not show leaves the
+    rendering as it is; new vertices come from somewhere; there are words for it; the mirror image of a symmetric mesh's
+    action is one.
     """
     _require(operator.takes in ("", "all", "edge", "vertex"), f"{operator.name}: takes must be all, edge, vertex or ''")
     with _known(operator):
@@ -218,9 +219,9 @@ def _check_edit(operator: Operator, mesh: PolyMesh, element: int, legal: bool, w
     n_vertices, n_edges, n_faces = after.counts
     parts, holes = after.topology.n_components, after.topology.n_holes
     _require(n_vertices - n_edges + n_faces == parts - holes, f"{where} breaks V - E + F = components - holes")
-    allowed = operator.changes[element % len(operator.changes)]
+    allowed = operator.change_at(mesh, element)
     for letter, old, new, change in zip("VEF", mesh.counts, after.counts, allowed, strict=True):
-        kept = new - old == change if change > 0 else new - old <= change
+        kept = new - old == change if change > 0 and operator.varies is None else new - old <= change
         _require(kept, f"{where} changes {letter} by {new - old}, not by {change}")
     _check_telling(operator, mesh, element, after, where)
     _check_mirror(operator, mesh, element, where)

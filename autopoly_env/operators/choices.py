@@ -12,7 +12,7 @@ from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import SequenceError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators.action import Choice
-from autopoly_env.operators.elements import corner_position, hole_face
+from autopoly_env.operators.elements import EDGE, corner_position, hole_face
 from autopoly_env.operators.holes import HoleChoice
 
 ChoiceIds = dict[str, Any]
@@ -67,6 +67,34 @@ def _corner_choice(mesh: PolyMesh, corner: int, ids: ChoiceIds) -> Choice:
     return links.offsets[face] + corner_position(mesh, face, to)
 
 
+def _vertex_choice_ids(mesh: PolyMesh, _vertex: int, choice: Choice) -> ChoiceIds:
+    assert isinstance(choice, int | np.integer)
+    return {"to": mesh.vertex_ids[int(choice)]}
+
+
+def _vertex_choice(mesh: PolyMesh, _vertex: int, ids: ChoiceIds) -> Choice:
+    match ids:
+        case {"to": int(to), **rest} if not rest and not isinstance(to, bool):
+            return mesh.vertex_index(to)
+    raise SequenceError(f"choice {_short(ids)}: expected the vertex to merge with, {{'to': id}}")
+
+
+def _edge_choice_ids(mesh: PolyMesh, _edge: int, choice: Choice) -> ChoiceIds:
+    assert isinstance(choice, int | np.integer)
+    return {"to": [mesh.vertex_ids[v] for v in mesh.edges[int(choice)]]}
+
+
+def _edge_choice(mesh: PolyMesh, _edge: int, ids: ChoiceIds) -> Choice:
+    match ids:
+        case {"to": [int(a), int(b)], **rest} if not rest and not isinstance(a, bool) and not isinstance(b, bool):
+            return EDGE.index(mesh, {"edge": [a, b]})
+    raise SequenceError(f"choice {_short(ids)}: expected the ends of the edge to fill to, {{'to': [id, id]}}")
+
+
+def _renamed_edge(ids: ChoiceIds, renaming: Renaming) -> ChoiceIds:
+    return {"to": [renaming.vertex(name) for name in ids["to"]]}
+
+
 def _hole_choice_ids(mesh: PolyMesh, hole: int, choice: Choice) -> ChoiceIds:
     assert isinstance(choice, HoleChoice)
     face = mesh.faces[hole_face(hole)[0]]
@@ -98,4 +126,6 @@ def _renamed_hole(ids: ChoiceIds, renaming: Renaming) -> ChoiceIds:
 
 
 TO_CORNER = ChoiceCodec(_corner_choice_ids, _corner_choice, lambda ids, r: {"to": r.vertex(ids["to"])})
+TO_VERTEX = ChoiceCodec(_vertex_choice_ids, _vertex_choice, lambda ids, r: {"to": r.vertex(ids["to"])})
+TO_EDGE = ChoiceCodec(_edge_choice_ids, _edge_choice, _renamed_edge)
 OF_HOLE = ChoiceCodec(_hole_choice_ids, _hole_choice, _renamed_hole)

@@ -61,6 +61,8 @@ class Operator:
     # What is left free: what `apply` chooses by default, and how a sequence writes it; None where nothing is
     choose: Callable[[PolyMesh, int], Choice | None] = _nothing_to_choose
     choice: ChoiceCodec | None = None
+    # At most, of (V, E, F), where that is not one number for all elements or choices; None: as `changes` says
+    varies: Callable[[PolyMesh, int], tuple[int, int, int]] | None = None
     # Whether it changes what is rendered; if not, a refit has nothing to gain
     shows: Callable[[PolyMesh, int], bool] = _always
     # Starts of a refit at what the picture still misses, or shows too much of, before the operator's own
@@ -83,6 +85,10 @@ class Operator:
     def module(self) -> str:
         """The module that it comes from, for messages."""
         return str(getattr(self.edit, "__module__", "an unknown module"))
+
+    def change_at(self, mesh: PolyMesh, element: int) -> tuple[int, int, int]:
+        """The change of (V, E, F), at most, when it works on an element."""
+        return self.changes[element % len(self.changes)] if self.varies is None else self.varies(mesh, element)
 
     @property
     def removes(self) -> bool:

@@ -19,7 +19,7 @@ from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import OPERATORS, Action
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import Silhouette
-from tests.helpers.constructions import TOTALS, house, score
+from tests.helpers.constructions import TOTALS, chapel, house, score
 from tests.helpers.drawings import HOUSE, painted
 from tests.helpers.player import HOSTILE, wanted
 from tests.helpers.tables import table
@@ -151,8 +151,12 @@ def test_save__is_whole_or_not_there(tmp_path: Path) -> None:
 
 
 def test_words__name_elements_and_keys_of_every_operator() -> None:
-    words = {step.operator: describe_step(step, len(step.moved)) for step in house().steps}
+    steps = (*house().steps, *chapel().steps)
+    words = {step.operator: describe_step(step, len(step.moved)) for step in steps}
     assert words.keys() == OPERATORS.keys()
+    assert words["edge_fill"].done == "Edge 1–4 and edge 1–5 are joined by a new face, face 3. All vertices stay."
+    assert words["vertex_merge"].done == "Vertex 9 is merged into vertex 6. All vertices stay."
+    assert words["edge_fill"].keys[0].endswith("click edge 1–4, `Shift` click edge 1–5")
     assert (
         words["edge_subdivide"].done == "Edge 0–1 gets vertex 4 in its middle. Then 1 vertex moves to fit the target."
     )
@@ -160,6 +164,7 @@ def test_words__name_elements_and_keys_of_every_operator() -> None:
     assert words["edge_extrude"].keys[-1].startswith("`G`")
     assert words["face_delete"].done == "Face 3 is deleted. All vertices stay."
     keys = {"edge_subdivide": "Subdivide", "edge_extrude": "`E`", "face_split": "`J`", "face_delete": "`X` › Faces"}
+    keys |= {"edge_cap": "`M` › At Center", "edge_fill": "`F`", "vertex_merge": "`M` › At Last"}
     keys |= {"face_hole": "`K`", "vertex_dissolve": "`Ctrl` `X`", "edge_dissolve": "`X` › Dissolve Edges"}
     for operator, key in keys.items():
         assert key in " ".join(words[operator].keys)
