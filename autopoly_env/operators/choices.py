@@ -76,7 +76,7 @@ def _vertex_choice(mesh: PolyMesh, _vertex: int, ids: ChoiceIds) -> Choice:
     match ids:
         case {"to": int(to), **rest} if not rest and not isinstance(to, bool):
             return mesh.vertex_index(to)
-    raise SequenceError(f"choice {_short(ids)}: expected the vertex to merge with, {{'to': id}}")
+    raise SequenceError(f"choice {shortened(ids)}: expected the vertex to merge with, {{'to': id}}")
 
 
 def _edge_choice_ids(mesh: PolyMesh, _edge: int, choice: Choice) -> ChoiceIds:
@@ -88,7 +88,7 @@ def _edge_choice(mesh: PolyMesh, _edge: int, ids: ChoiceIds) -> Choice:
     match ids:
         case {"to": [int(a), int(b)], **rest} if not rest and not isinstance(a, bool) and not isinstance(b, bool):
             return EDGE.index(mesh, {"edge": [a, b]})
-    raise SequenceError(f"choice {_short(ids)}: expected the ends of the edge to fill to, {{'to': [id, id]}}")
+    raise SequenceError(f"choice {shortened(ids)}: expected the ends of the edge to fill to, {{'to': [id, id]}}")
 
 
 def _renamed_edge(ids: ChoiceIds, renaming: Renaming) -> ChoiceIds:
