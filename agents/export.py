@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from autopoly_env.sequence import ConstructionSequence
 
 DEFAULT = "html"
+_CHECK = "autopoly_env.conformance.check_format shows where"
 
 _FORMATS = "\n".join(f"  {name:8} {line}" for name, _, line in LISTED)
 
@@ -128,16 +129,18 @@ def _choose(to: str | None, out: Path | None, n: int) -> Format:
 
 
 def _write(made: Format, export: Export, goal: Path) -> None:
-    """Write a file. Raises OutputError, in one line that names the format, for whatever a writer may do."""
+    """Write a file. Raises OutputError, in one line that names the format and its module, for what a writer may do."""
+    module = str(getattr(made.write, "__module__", "an unknown module"))
+    who = f"{goal}: the writer of {made.name!r}, of {module}"
     try:
         made.write(export, goal)
     except (ConfigError, OutputError, SequenceError):
         raise
     except Exception as error:  # whatever it is, the other sequences can be written
-        what = described(error, str(getattr(made.write, "__module__", "")))
-        raise OutputError(f"{goal}: the writer of {made.name} failed: {what}") from error
+        what = described(error, module)
+        raise OutputError(f"{who}, failed: {what}; expected a file or an OutputError ({_CHECK})") from error
     if not goal.exists():
-        raise OutputError(f"{goal}: the writer of {made.name} made no such file")
+        raise OutputError(f"{who}, made no such file ({_CHECK})")
 
 
 def _load(path: Path, step: int | None) -> "ConstructionSequence":

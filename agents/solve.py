@@ -47,6 +47,8 @@ and how the construction reads (docs/lessons.md): the number of actions, and
   valid: share of meshes without crossings and flipped faces, 1 is expected
   blocking_in: mean r_sm on the way, high where the big shape comes first
   moved: share of the vertices already there that a step moves, LOW is good
+With --columns lesson also: quads (share of the faces), ngons and concave
+(faces), effort (seconds to follow it by hand), returns (to a part that was left).
 
 Ctrl-C writes the best mesh so far of the image in work and stops; a second one aborts at once.
 Exit codes: 0 all is well, 1 something failed, 2 wrong usage, 130 Ctrl-C.
@@ -110,16 +112,22 @@ def solve(
     as_json: Annotated[
         bool, typer.Option("--json", help="Print a JSON record a line as each image is done, no table.")
     ] = False,
+    columns: Annotated[
+        str,
+        typer.Option(metavar="NAMES", help="What the table shows: lesson, or names of a JSON record with commas."),
+    ] = "",
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar, no notes.")] = False,
 ) -> int:
     """Check everything that can be checked before the work, then do it; return the exit code."""
     from agents.budget import Budget
-    from agents.commands.report import Report
+    from agents.commands.columns import read_columns
+    from agents.commands.report import COLUMNS, FORMATS, Report
     from agents.commands.results import claim_folder
     from agents.commands.solving import Settings, name_jobs, solve_all
     from agents.commands.wishes import read_wishes
     from autopoly_env.score import ScoreWeights
 
+    shown = read_columns(columns, FORMATS, COLUMNS)
     weights = ScoreWeights(w_sm, w_sc, w_si, w_locality)
     budget = Budget(refits, seconds, simulations)
     wishes = read_wishes(importance, start, lock, symmetry)
@@ -129,7 +137,7 @@ def solve(
     found, problems = _find(images)
     jobs = name_jobs(found, out)
     claim_folder(out)
-    with Report(len(jobs) + len(problems), as_json=as_json, quiet=quiet) as report:
+    with Report(len(jobs) + len(problems), as_json=as_json, quiet=quiet, columns=shown) as report:
         for image, problem in problems:
             report.failed(image, problem)
         return solve_all(jobs, settings, out, report)

@@ -34,6 +34,12 @@ def number(name: str, value: Any) -> float:
     return float(value)
 
 
+def shortened(value: object) -> str:
+    """A value for a message, at most 40 characters long."""
+    text = repr(value)
+    return text if len(text) <= 40 else text[:37] + "..."
+
+
 @dataclass(frozen=True)
 class Defect:
     """What is wrong with a value: where it stands, what pydantic says of it, and the value itself."""

@@ -1,4 +1,4 @@
-"""Checks for parts of your own: an operator, a simulator, a target source or an environment that others can rely on.
+"""Checks for parts of your own: operators, simulators, target sources, formats and environments to rely on.
 
 Each check returns None, or raises ConformanceError naming the rule that was broken, and where. Example, in a test:
 
@@ -7,13 +7,16 @@ Each check returns None, or raises ConformanceError naming the rule that was bro
 """
 
 import pickle
+import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from autopoly_env.errors import AutoPolyError, ConfigError, ConformanceError, IllegalActionError
+from autopoly_env.errors import AutoPolyError, ConfigError, ConformanceError, IllegalActionError, OutputError
+from autopoly_env.export.formats import Export, Format
 from autopoly_env.export.player import describe_step
 from autopoly_env.mesh import PolyMesh, images_of, is_valid
 from autopoly_env.operators import OPERATORS, STOP, Action, Operator, Start
@@ -35,9 +38,10 @@ def check_operator(operator: Operator, meshes: Iterable[PolyMesh] | None = None)
 
     Rules: the mask has one bool per element and says where `apply` works; elsewhere it raises IllegalActionError. The
     mesh that comes out is valid; V - E + F is components - holes; (V, E, F) change by `changes` at most, an increase
-    exactly; ids are never reused and what survives keeps its id; the same input gives the same mesh and is not touched.
-    A step of it, written as JSON, replays to the same mesh; what does not show leaves the rendering as it is; new
-    vertices come from somewhere; there are words for it; the mirror image of a symmetric mesh's action is one.
+    exactly, or by `varies` at most; ids are never reused and what survives keeps its id; the same input gives the same
+    mesh and is not touched. A step of it, written as JSON, replays to the same mesh; what does not show leaves the
+    rendering as it is; new vertices come from somewhere; there are words for it; the mirror image of a symmetric mesh's
+    action is one.
     """
     _require(operator.takes in ("", "all", "edge", "vertex"), f"{operator.name}: takes must be all, edge, vertex or ''")
     with _known(operator):
@@ -97,6 +101,51 @@ def check_target_source(source: TargetSource, n: int = 10) -> None:
         seen.add(shape.mask.tobytes())
     _require(len(seen) > 1 or n < 2, f"{n} seeds give one and the same target")
     _require(_raises(ConfigError, lambda: source.sample(-1)), "seed -1 is not refused with a ConfigError")
+
+
+def check_format(made: Format) -> None:
+    """Check a format that sequences are exported to.
+
+    Rules: for a sequence with steps, one without and, where it shows them, a target and a depth, a file of each of its
+    endings is written, in a folder that has to be made, and nothing beside it; the same export gives the same bytes,
+    and the sequence stays as it was; a place that cannot be written raises OutputError.
+    """
+    for export in _sample_exports(made):
+        before = export.sequence.to_json()
+        for suffix in made.suffixes:
+            where = f"format {made.name}, {len(export.sequence.steps)} steps, {suffix}"
+            with tempfile.TemporaryDirectory() as folder:
+                paths = [Path(folder) / name / f"shape{suffix}" for name in ("one", "two")]
+                for path in paths:
+                    _written(made, export, path, where)
+                    _require(
+                        path.is_file() and path.stat().st_size > 0, f"{where}: there is no such file, or it is empty"
+                    )
+                    _require(list(path.parent.iterdir()) == [path], f"{where}: more than the file was left")
+                _require(paths[0].read_bytes() == paths[1].read_bytes(), f"{where}: not the same bytes twice")
+                refused = _raises(OutputError, lambda: made.write(export, paths[0] / f"below{suffix}"))  # noqa: B023
+                _require(refused, f"{where}: a place that cannot be written is no OutputError")
+        _require(export.sequence.to_json() == before, f"format {made.name} changed the sequence")
+
+
+def _sample_exports(made: Format) -> Iterator[Export]:
+    """A sequence of one step, the same before it, and with whatever the format shows."""
+    mesh = PolyMesh.rectangle(0.25, 0.25, 0.75, 0.75)
+    action = Action("edge_extrude", 0)
+    after = OPERATORS[action.operator].apply(mesh, action.element)
+    sequence = ConstructionSequence.record({}, mesh, _NO_SCORE, [(action, None, after, _NO_SCORE)])
+    yield from (Export(sequence), Export(sequence.trim(0)))
+    if made.shows_target:
+        yield Export(sequence, target=Silhouette(np.eye(_LOOK, dtype=bool)))
+    if made.shows_depth:
+        yield Export(sequence, depth=0.25)
+
+
+def _written(made: Format, export: Export, path: Path, where: str) -> None:
+    try:
+        made.write(export, path)
+    except Exception as error:
+        raise ConformanceError(f"{where}: {type(error).__name__}: {error}") from error
 
 
 def check_env(env: Any, n_steps: int = 60, seed: int = 0) -> None:
@@ -170,9 +219,9 @@ def _check_edit(operator: Operator, mesh: PolyMesh, element: int, legal: bool, w
     n_vertices, n_edges, n_faces = after.counts
     parts, holes = after.topology.n_components, after.topology.n_holes
     _require(n_vertices - n_edges + n_faces == parts - holes, f"{where} breaks V - E + F = components - holes")
-    allowed = operator.changes[element % len(operator.changes)]
+    allowed = operator.change_at(mesh, element)
     for letter, old, new, change in zip("VEF", mesh.counts, after.counts, allowed, strict=True):
-        kept = new - old == change if change > 0 else new - old <= change
+        kept = new - old == change if change > 0 and operator.varies is None else new - old <= change
         _require(kept, f"{where} changes {letter} by {new - old}, not by {change}")
     _check_telling(operator, mesh, element, after, where)
     _check_mirror(operator, mesh, element, where)

@@ -35,7 +35,7 @@ class State:
     """A shape on the way, and how it came from the one before."""
 
     mesh: PolyMesh
-    score: Score  # what the step that made it is docked under `w_locality` is off its total
+    score: Score  # its total less what `w_locality` charges the step that made it (`Simulator.docked`)
     step: int = 0
     done: str = ""  # why it is over: "stop", "matched", "max_steps"; empty while it goes on
     action: Action | None = None  # what made it, None for an initial state

@@ -77,9 +77,33 @@ def edge_dissolve() -> Example:
     return Example(mesh, mesh.edge_index(1, 2), Highlight(edges=((1, 2),)), Highlight(faces=(0,)))
 
 
+def edge_cap() -> Example:
+    """The top of a wall gets a gable."""
+    mesh = PolyMesh.from_faces([(0.15, 0.5), (0.85, 0.5), (0.85, 0.92), (0.15, 0.92)], [(0, 1, 2, 3)])
+    return Example(mesh, mesh.edge_index(0, 1), Highlight(edges=((0, 1),)))
+
+
+def edge_fill() -> Example:
+    """The ends of two arms are joined, which closes a ring."""
+    corners = [(0.1, 0.9), (0.35, 0.68), (0.65, 0.68), (0.9, 0.9), (0.1, 0.15), (0.35, 0.35), (0.9, 0.15), (0.65, 0.35)]
+    mesh = PolyMesh.from_faces(corners, [(1, 2, 3, 0), (1, 0, 4, 5), (3, 2, 7, 6)])
+    return Example(mesh, mesh.edge_index(4, 5), Highlight(edges=((4, 5), (6, 7))))
+
+
+def vertex_merge() -> Example:
+    """A roof is closed: the ends of its two sides become one vertex."""
+    corners = [(0.1, 0.6), (0.5, 0.6), (0.9, 0.6), (0.9, 0.9), (0.5, 0.9), (0.1, 0.9), (0.3, 0.15), (0.62, 0.15)]
+    mesh = PolyMesh.from_faces(corners, [(0, 1, 4, 5), (1, 2, 3, 4), (0, 6, 1), (1, 7, 2)])
+    ends = Highlight(vertices=(6, 7), edges=((1, 6), (1, 7)))
+    return Example(mesh, 6, ends, Highlight(vertices=(7,), edges=((1, 7),)))
+
+
 EXAMPLES: dict[str, Callable[[], Example]] = {
     example.__name__: example
-    for example in (edge_subdivide, edge_extrude, face_split, face_delete, face_hole, vertex_dissolve, edge_dissolve)
+    for example in (
+        *(edge_subdivide, edge_extrude, face_split, face_delete, face_hole, vertex_dissolve, edge_dissolve),
+        *(edge_cap, edge_fill, vertex_merge),
+    )
 }
 
 

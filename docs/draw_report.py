@@ -17,7 +17,7 @@ from training.evaluate import main as evaluate
 HERE = Path(__file__).parent
 AGENTS = "random,greedy,beam,trace"
 WIDTH = 1240  # CSS pixels
-SECTIONS = {"scores": (1, 2), "work": (3,), "targets": (4,)}  # which of the page's sections a picture shows
+SECTIONS = {"scores": (1, 2, 3), "work": (4,), "targets": (5,)}  # which of the page's sections a picture shows
 HEIGHTS = {"targets": 860}  # CSS pixels at most
 
 

@@ -16,7 +16,7 @@ from autopoly_env.mesh import PolyMesh, Topology, is_valid
 from autopoly_env.operators import EDGE, Choice, Operator, Start
 from autopoly_env.operators.mirroring import again
 from autopoly_env.operators.operator import Mirroring
-from autopoly_env.operators.wording import EDGES, Phrases, begun_with, element_words
+from autopoly_env.operators.wording import EDGES, Gesture, Phrases, begun_with, element_words
 
 
 def collapsed(mesh: PolyMesh, edge: int) -> PolyMesh | None:
@@ -104,6 +104,7 @@ edge_collapse = Operator(
         lambda step: (f"{EDGES} edge select, click {element_words(step)}", "`M` › At Center"),
         "Mesh › Merge › At Center",
         "mesh.merge",
+        lambda _: Gesture("KPBB"),
     ),
     blender=blender_arguments,
     blender_code=BLENDER,

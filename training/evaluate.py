@@ -73,20 +73,31 @@ def evaluate(
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the run in OUT, if there is one.")] = False,
     fresh: Annotated[bool, typer.Option("--fresh", help="Replace the run in OUT.")] = False,
     merge: Annotated[bool, typer.Option("--merge", help="Join the shards of a run in OUT.")] = False,
+    columns: Annotated[
+        str,
+        typer.Option(
+            metavar="NAMES",
+            help="What the table shows: lesson, or names of --json with commas, such as r_all,quads,effort.",
+        ),
+    ] = "",
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the rows of the table as JSON, a line each, and no table.")
     ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress.")] = False,
 ) -> int:
     """Check what can be checked before the work, do it, show the table; return the exit code."""
+    from agents.commands.columns import read_columns
     from training.evaluation.folder import merge as merge_runs
     from training.evaluation.run import Machines, TargetShard, run_suite
+    from training.evaluation.table import KNOWN
+    from training.report.table import FORMATS
 
+    shown = read_columns(columns, KNOWN, FORMATS)
     _check_flags(suite, resume=resume, fresh=fresh, merge=merge)
     if merge:
         folder = out or FOLDER / "merged"
         merge_runs([Path(part) for part in suite], folder, fresh=fresh)
-        return _finish(folder, baseline, as_json)
+        return _finish(folder, baseline, as_json, shown)
     found, only = _read(suite[0], override or [], budget, agents, baseline)
     part = TargetShard.parse(shard)
     folder = out or FOLDER / (found.name + (f"-{part.k}of{part.n}" if part.n > 1 else ""))
@@ -96,7 +107,7 @@ def evaluate(
     except KeyboardInterrupt:
         print(f"stopped by Ctrl-C; what was done is in {folder}: go on with --resume", file=sys.stderr)
         return INTERRUPTED
-    return _finish(folder, baseline, as_json)
+    return _finish(folder, baseline, as_json, shown)
 
 
 def _check_flags(given: list[str], *, resume: bool, fresh: bool, merge: bool) -> None:
@@ -123,12 +134,12 @@ def _read(
     return suite, only
 
 
-def _finish(folder: Path, baseline: str | None, as_json: bool) -> int:
+def _finish(folder: Path, baseline: str | None, as_json: bool, columns: tuple[str, ...]) -> int:
     """Write and show the table of a run; 1 if some of its tasks failed."""
     from rich.console import Console
 
     from training.evaluation.folder import suite_of
-    from training.evaluation.table import HEADS, lines_of, records_of, table_of, write_tables
+    from training.evaluation.table import heads_of, lines_of, records_of, table_of, write_tables
     from training.records import read_info, read_records
     from training.report.table import as_rich
 
@@ -144,7 +155,7 @@ def _finish(folder: Path, baseline: str | None, as_json: bool) -> int:
         console = Console()
         if not console.is_terminal:
             console.width = PLAIN_WIDTH
-        console.print(as_rich(HEADS, lines_of(table)))
+        console.print(as_rich(heads_of(columns), lines_of(table, columns)))
         for line in (*table.notes, f"Open {folder / 'table.md'}"):
             console.print(line, markup=False, highlight=False, emoji=False, soft_wrap=True)
     n_failed = sum(record.outcome is None for record in records)

@@ -1,15 +1,13 @@
 """The command `python -m training.make_dataset`: targets by the thousand, on disk, for training and tests."""
 
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import Progress
 
+from agents.commands.progress import TASK, progress_bar
 from agents.commands.running import FAILURE, INTERRUPTED, run_command
 from autopoly_env.errors import ConfigError
 
@@ -115,12 +113,12 @@ def verify(
 
     manifest = read_manifest(folder)
     n_wrong = 0
-    with _progress(len(manifest.names), 0, quiet) as bar:
+    with progress_bar(len(manifest.names), is_hidden=quiet, shows_left=True) as bar:
         for _, problem in check_dataset(folder):
             n_wrong += problem is not None
             if problem is not None:
                 _say(bar, f"error: {problem}")
-            bar.advance(bar.task_ids[0])
+            bar.advance(TASK)
     n_right = len(manifest.names) - n_wrong
     print(f"{folder}: {n_right} of {len(manifest.names)} shards are as they should be ({manifest.n} targets)")
     return FAILURE if n_wrong else 0
@@ -151,13 +149,13 @@ def silhouettes(
     needs_trimesh(tasks)
     engine = "serial" if len(tasks) == 1 and engine == "process" else engine
     records: dict[str, dict[str, str | None]] = {}
-    with _progress(len(tasks), 0, quiet) as bar:
+    with progress_bar(len(tasks), is_hidden=quiet, shows_left=True) as bar:
         for done in map_tasks(draw_model, tasks, engine=engine, n_workers=workers):
             picture = None if done.value is None else write_atomically(out / f"{done.task.name}.png", done.value).name
             records[done.task.name] = {"model": str(done.task.model), "picture": picture, "error": done.error}
             if done.error is not None:
                 _say(bar, f"error: {done.error}")
-            bar.advance(bar.task_ids[0])
+            bar.advance(TASK)
     write_index(out, [records[task.name] for task in tasks])
     n_failed = sum(record["error"] is not None for record in records.values())
     print(f"{out}: {len(tasks) - n_failed} of {len(tasks)} silhouettes")
@@ -176,12 +174,12 @@ def _build(
     manifest = begin_dataset(out, settings, n, shard_size, resume=resume, fresh=fresh)
     n_done, n_shards = len(manifest.shards), len(manifest.names)
     try:
-        with _progress(n_shards, n_done, quiet) as bar:
+        with progress_bar(n_shards, n_done=n_done, is_hidden=quiet, shows_left=True) as bar:
 
             def on_shard(_: ShardInfo | None, problem: str | None) -> None:
                 if problem is not None:
                     _say(bar, f"error: {problem}")
-                bar.advance(bar.task_ids[0])
+                bar.advance(TASK)
 
             manifest = build_dataset(out, settings, manifest, **machines, on_shard=on_shard)
     except KeyboardInterrupt:
@@ -198,26 +196,6 @@ def _range(text: str) -> tuple[int, int]:
     if not least.isdecimal() or not (most or least).isdecimal():
         raise ConfigError(f"--difficulty {text}: expected a number or a range, such as 3 or 1-5")
     return int(least), int(most or least)
-
-
-@contextmanager
-def _progress(n: int, n_done: int, quiet: bool) -> Iterator[Progress]:
-    """A progress bar on stderr, where that is a terminal."""
-    console = Console(stderr=True)
-    bar = Progress(
-        MofNCompleteColumn(),
-        BarColumn(bar_width=24),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-        console=console,
-        disable=quiet or not console.is_terminal,
-        redirect_stdout=False,
-        transient=True,
-    )
-    bar.add_task("", total=n, completed=n_done)
-    with bar:
-        yield bar
 
 
 def _say(bar: Progress, text: str) -> None:

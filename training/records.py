@@ -19,6 +19,7 @@ from autopoly_env.arguments import first_defect
 from autopoly_env.errors import OutputError, RunError
 from autopoly_env.files import write_atomically
 from autopoly_env.mesh import PolyMesh
+from autopoly_env.sequence import LESSON_FIELDS
 
 FORMAT, VERSION = "autopoly-run", 1
 RUN_FILE, RECORDS_FILE, TARGETS_FOLDER = "run.json", "records.jsonl", "targets"
@@ -59,12 +60,19 @@ class Outcome:
     n_actions: int  # of the construction sequence
     n_refits: int
     seconds: float
-    stopped_by: str  # as in `agents.base.Stats`
+    stopped_by: str  # as in `agents.solution.Stats`
     curve: list[tuple[int, float, float]]  # refits, seconds, best r_all so far, at the resolution of the search
     mesh: MeshData
-    valid: float | None = None  # these three as in `autopoly_env.sequence.Lesson`; older records have none
+    valid: float | None = (
+        None  # these and all that follow as in `autopoly_env.sequence.Lesson`; older records have none
+    )
     blocking_in: float | None = None
     moved: float | None = None
+    quads: float | None = None
+    ngons: int | None = None
+    concave: int | None = None
+    effort: float | None = None
+    returns: int | None = None
 
 
 @dataclass(frozen=True)
@@ -103,7 +111,7 @@ class Record:
 
 
 OUTCOME_FIELDS = tuple(field.name for field in fields(Outcome))
-_LESSON_FIELDS = ("valid", "blocking_in", "moved")
+_LESSON_FIELDS = set(LESSON_FIELDS) - {"n_actions"}  # what older records may lack
 RECORD_FIELDS = {"agent", "target", "seed", *OUTCOME_FIELDS, "error"}
 _RECORD = TypeAdapter(Record)
 

@@ -18,12 +18,11 @@ from typing import Annotated
 import numpy as np
 import torch
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.utils import set_random_seed
 from stable_baselines3.common.vec_env import VecEnv
 
+from agents.commands.progress import progress_bar
 from agents.rl.algorithms import load_checkpoint, make_model, net_of_zip
 from agents.rl.envs import EnvFactory, make_vec_env
 from agents.rl.network import MeshNet
@@ -69,7 +68,7 @@ def train_rl(config: TrainRlConfig, folder: Path, trust: bool = False) -> RunSta
             put_net(model.policy, initial_net(config, trust))
         session = Session(config, folder, state, lr)
         if not session.is_over:
-            with _Bar(run, state) as session.bar:
+            with progress_bar(run.total_steps, "steps", n_done=state.step, takes_prints=True) as session.bar:
                 model.learn(run.total_steps - state.step, session, log_interval=None, reset_num_timesteps=False)  # type: ignore[arg-type]
             session.end()
     finally:
@@ -100,26 +99,6 @@ def _environments(config: TrainRlConfig, step: int) -> VecEnv:
 def _seed(run: RlRunConfig, step: int) -> int:
     """Of the environments and of sampling, from a step on."""
     return int(np.random.SeedSequence((run.seed, step)).generate_state(1)[0] >> 1)
-
-
-class _Bar:
-    """A progress bar where there is a terminal."""
-
-    def __init__(self, run: RlRunConfig, state: RunState) -> None:
-        console = Console(stderr=True)
-        columns = (TextColumn("steps"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-        self._bar = Progress(*columns, console=console, disable=not console.is_terminal)
-        self._task = self._bar.add_task("steps", total=run.total_steps, completed=state.step)
-
-    def __enter__(self) -> "_Bar":
-        self._bar.start()
-        return self
-
-    def __call__(self, step: int) -> None:
-        self._bar.update(self._task, completed=step)
-
-    def __exit__(self, *_error: object) -> None:
-        self._bar.stop()
 
 
 HELP = """Train a policy with an algorithm of Stable-Baselines3.

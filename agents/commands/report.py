@@ -10,13 +10,32 @@ from rich.table import Table
 from rich.text import Text
 
 from agents import budget
+from agents.commands.columns import LESSON
 from agents.commands.progress import TASK, progress_bar
 from agents.commands.results import Result
 from autopoly_env.sequence import Lesson
 
+FORMATS = {  # of the numbers that a table can show, each and as a mean
+    "r_sm": (".4f", ".4f"),
+    "r_sc": (".0f", ".1f"),
+    "r_si": (".0f", ".1f"),
+    "r_all": (".2f", ".2f"),
+    "V": (".0f", ".1f"),
+    "E": (".0f", ".1f"),
+    "F": (".0f", ".1f"),
+    "actions": (".0f", ".1f"),
+    "valid": (".2f", ".2f"),
+    "blocking_in": (".3f", ".3f"),
+    "moved": (".3f", ".3f"),
+    "quads": (".2f", ".2f"),
+    "ngons": (".0f", ".1f"),
+    "concave": (".0f", ".1f"),
+    "effort": (".1f", ".1f"),
+    "returns": (".0f", ".2f"),
+    "refits": (".0f", ".1f"),
+    "seconds": (".2f", ".2f"),
+}
 COLUMNS = ("r_sm", "r_sc", "r_si", "r_all", "actions", "valid", "blocking_in", "moved", "refits", "seconds")
-FORMATS = (".4f", ".0f", ".0f", ".2f", ".0f", ".2f", ".3f", ".3f", ".0f", ".2f")
-MEAN_FORMATS = (".4f", ".1f", ".1f", ".2f", ".1f", ".2f", ".3f", ".3f", ".1f", ".2f")
 WARNING = "warning:"
 MOST_NOTES = 8  # lines of notes below a table
 MOST_NAMES = 4  # names of images in such a line
@@ -26,10 +45,13 @@ PLAIN_WIDTH = 120  # of a table that goes to a file
 class Report:
     """Tells the user how it goes with `n_tasks` images; as a context it shows the progress bar where it can be seen."""
 
-    def __init__(self, n_tasks: int, *, as_json: bool = False, quiet: bool = False) -> None:
+    def __init__(
+        self, n_tasks: int, *, as_json: bool = False, quiet: bool = False, columns: tuple[str, ...] = COLUMNS
+    ) -> None:
         self.n_failed = 0
+        self._columns = columns
         self._as_json, self._quiet = as_json, quiet
-        self._rows: dict[str, tuple[float, ...]] = {}
+        self._rows: dict[str, dict[str, float]] = {}
         self._notes: dict[str, list[str]] = {}  # the names of the images that have a note
         self._warnings: list[str] = []
         self._picture: Path | None = None
@@ -97,7 +119,7 @@ class Report:
         if not (self._quiet and self._as_json):
             lines.append(f"Open {overview or self._picture}")
         if not self._as_json:
-            self._output.print(_table(self._rows))
+            self._output.print(_table(self._rows, self._columns))
         for line in lines:
             _print_line(self._messages if self._as_json else self._output, line)
 
@@ -110,23 +132,35 @@ def _print_record(record: dict[str, Any]) -> None:
     print(json.dumps(record, allow_nan=False), flush=True)
 
 
-def _numbers_of(result: Result) -> tuple[float, ...]:
-    """A row of the table, in the order of COLUMNS."""
+def _numbers_of(result: Result) -> dict[str, float]:
+    """All that a table can show, in the order of FORMATS."""
     score, stats = result.solution.score, result.solution.stats
     lesson = Lesson.of(result.solution.sequence)
-    parts = (score.iou, score.complexity, score.self_intersections, score.total)
-    return (*parts, lesson.n_actions, lesson.valid, lesson.blocking_in, lesson.moved, stats.n_refits, stats.seconds)
+    n_vertices, n_edges, n_faces = result.solution.mesh.counts
+    return {
+        "r_sm": score.iou,
+        "r_sc": score.complexity,
+        "r_si": score.self_intersections,
+        "r_all": score.total,
+        "V": n_vertices,
+        "E": n_edges,
+        "F": n_faces,
+        "actions": lesson.n_actions,
+        **{name: value for name, value in vars(lesson).items() if name in LESSON},
+        "refits": stats.n_refits,
+        "seconds": stats.seconds,
+    }
 
 
-def _table(rows: dict[str, tuple[float, ...]]) -> Table:
-    """A row for every image, and their mean if there are several."""
+def _table(rows: dict[str, dict[str, float]], columns: tuple[str, ...]) -> Table:
+    """A row for every image, by its numbers, and their mean if there are several."""
     table = Table(box=box.SIMPLE_HEAD, show_footer=len(rows) > 1)
-    means = [sum(column) / len(rows) for column in zip(*rows.values(), strict=True)]
     table.add_column("name", footer=f"mean of {len(rows)}", overflow="fold")
-    for name, mean, style in zip(COLUMNS, means, MEAN_FORMATS, strict=True):
-        table.add_column(name, footer=format(mean, style), justify="right", no_wrap=True)
-    for name, row in rows.items():
-        table.add_row(Text(name), *(format(value, style) for value, style in zip(row, FORMATS, strict=True)))
+    for name in columns:
+        mean = sum(numbers[name] for numbers in rows.values()) / len(rows)
+        table.add_column(name, footer=format(mean, FORMATS[name][1]), justify="right", no_wrap=True)
+    for image, numbers in rows.items():
+        table.add_row(Text(image), *(format(numbers[name], FORMATS[name][0]) for name in columns))
     return table
 
 
@@ -146,30 +180,15 @@ def _note_lines(notes: dict[str, list[str]], n_images: int) -> list[str]:
 
 def record_of(result: Result) -> dict[str, Any]:
     """A result as plain values, for JSON."""
-    solution = result.solution
-    n_vertices, n_edges, n_faces = solution.mesh.counts
-    settings = solution.sequence.settings
-    lesson = Lesson.of(solution.sequence)
+    settings = result.solution.sequence.settings
     return {
         "image": str(result.image),
         "name": result.name,
         "agent": settings["agent"],
         "settings": settings,
         "seed": settings["seed"],
-        "r_sm": solution.score.iou,
-        "r_sc": solution.score.complexity,
-        "r_si": solution.score.self_intersections,
-        "r_all": solution.score.total,
-        "V": n_vertices,
-        "E": n_edges,
-        "F": n_faces,
-        "actions": lesson.n_actions,
-        "valid": lesson.valid,
-        "blocking_in": lesson.blocking_in,
-        "moved": lesson.moved,
-        "refits": solution.stats.n_refits,
-        "seconds": solution.stats.seconds,
-        "stopped_by": solution.stats.stopped_by,
+        **_numbers_of(result),
+        "stopped_by": result.solution.stats.stopped_by,
         "notes": list(result.notes),
         "files": {name: str(path) for name, path in result.files.items()},
     }

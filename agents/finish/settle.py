@@ -40,7 +40,8 @@ def settle(sequence: ConstructionSequence, simulator: Simulator) -> Construction
     scores = [simulator.final_score(mesh).as_dict() for mesh in film.meshes]
     rows = zip(film.taken, film.meshes[1:], scores[1:], strict=True)
     transitions = [(action, choice, mesh, score) for (action, choice), mesh, score in rows]
-    return ConstructionSequence.record(sequence.settings, film.meshes[0], scores[0], transitions)
+    told = ConstructionSequence.record(sequence.settings, film.meshes[0], scores[0], transitions)
+    return told.with_parts(sequence.parts)
 
 
 @dataclass(frozen=True)

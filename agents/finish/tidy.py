@@ -95,6 +95,7 @@ def _without(
         return None
     transitions = [(action, choice, mesh, score) for (action, choice, mesh), score in zip(taken, scores, strict=True)]
     later = ConstructionSequence.record(sequence.settings, meshes[first], sequence.start_score, transitions)
+    later = later.with_parts(steps[k].part for k in kept)
     return replace(sequence, steps=(*steps[:first], *later.steps))
 
 

@@ -8,11 +8,9 @@ for a softmax of r_all over a temperature is exact. Letters: A actions, K operat
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from agents.guided.measures import candidate_arrays
 from agents.guided.nfap import Foresight, NfapNet, candidates_of
@@ -21,7 +19,7 @@ from agents.guided.warp import WarpNet
 from agents.guided.weights import NetworkMeta
 from agents.search.batched import BatchedEvaluator
 from agents.search.evaluator import ResidualEvaluator
-from autopoly_env.arrays import FloatArray
+from autopoly_env.arrays import AnyArray, FloatArray
 from autopoly_env.errors import IllegalActionError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import Action, Choice, operator_named
@@ -62,8 +60,8 @@ class NfapEvaluator(BatchedEvaluator[Foresight]):
 
     def _extra_price(self, simulator: Simulator, actions: Sequence[Action]) -> FloatArray:
         """(A,) what the elements that each action adds cost more than in training, in units of the labels' softmax."""
-        dearer = (simulator.weights.w_sc - self._trained_w_sc) / self._label_temperature
-        return dearer * np.array([float(sum(_changes(action))) for action in actions])
+        price_change = (simulator.weights.w_sc - self._trained_w_sc) / self._label_temperature
+        return price_change * np.array([float(sum(_changes(action))) for action in actions])
 
     def _evaluate(self, simulator: Simulator, states: Sequence[State]) -> Iterable[Foresight]:
         """The first stage of what the network foresees."""
@@ -116,7 +114,7 @@ class WarpEvaluator(NfapEvaluator):
                     yield action, start.choice, start.mesh
                 else:
                     operator = operator_named(action.operator)
-                    choice = operator.choose(state.mesh, action.element)
+                    choice = operator.choice_at(state.mesh, action.element)
                     yield action, choice, operator.apply(state.mesh, action.element, choice)
             except IllegalActionError:
                 continue
@@ -133,7 +131,7 @@ class WarpEvaluator(NfapEvaluator):
         return [mesh.with_vertices(row[: len(mesh.vertices)]) for row, mesh in zip(carried, meshes, strict=True)]
 
 
-def _padded(arrays: Sequence[NDArray[Any]], padding: int) -> torch.Tensor:
+def _padded(arrays: Sequence[AnyArray], padding: int) -> torch.Tensor:
     """Arrays (n, 2) of different lengths as one tensor (B, longest, 2)."""
     batch = np.full((len(arrays), max(map(len, arrays)), 2), padding, arrays[0].dtype)
     for row, array in zip(batch, arrays, strict=True):

@@ -4,14 +4,12 @@ Letters: A actions, P points of each, M measures.
 """
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from agents.guided.config import class_of
 from agents.guided.regions import N_POINTS, action_points
-from autopoly_env.arrays import FloatArray
+from autopoly_env.arrays import AnyArray, FloatArray
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import Action, operator_named
 from autopoly_env.placement import Disagreement
@@ -23,7 +21,7 @@ _ALONG = (np.arange(N_POINTS) + 0.5)[:, None] / N_POINTS
 
 def candidate_arrays(
     disagreement: Disagreement, actions: Sequence[Action], classes: tuple[str, ...]
-) -> dict[str, NDArray[Any]]:
+) -> dict[str, AnyArray]:
     """What nFAP-Net reads about the legal actions, the residual prior left out: `agents.guided.nfap.Candidates`."""
     mesh = disagreement.mesh
     points = action_points(mesh, actions)

@@ -3,14 +3,13 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from agents.guided.config import Input
-from autopoly_env.arrays import FloatArray
+from autopoly_env.arrays import Float32Array, FloatArray
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.raster import coverage
 
-Picture = NDArray[np.float32]
+Picture = Float32Array
 
 
 def rendering(mesh: PolyMesh, size: int) -> Picture:

@@ -7,7 +7,7 @@ import numpy as np
 from agents.rl.player import Player
 from agents.search.batched import BatchedEvaluator
 from autopoly_env.arrays import FloatArray
-from autopoly_env.errors import ConfigError, IllegalActionError
+from autopoly_env.errors import IllegalActionError
 from autopoly_env.operators import Action
 from autopoly_env.simulator import Simulator, State
 
@@ -44,9 +44,4 @@ class RlEvaluator(BatchedEvaluator[FloatArray]):
         return self._player.logits([simulator] * len(states), states)
 
     def _fits(self, state: State) -> bool:
-        """Whether the policy's padding has room for the mesh."""
-        try:
-            self._player.check_fits(state)
-        except ConfigError:
-            return False
-        return True
+        return self._player.fits(state)

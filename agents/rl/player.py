@@ -13,7 +13,7 @@ from agents.budget import Meter
 from agents.rl.network import NEVER, MeshNet, observer_of
 from agents.solution import Track
 from autopoly_env.arrays import BoolArray, ByteArray, FloatArray, IntArray
-from autopoly_env.errors import IllegalActionError
+from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.observation import Observation
 from autopoly_env.operators import STOP, Action, ActionCodec
 from autopoly_env.silhouette import Silhouette
@@ -53,6 +53,14 @@ class Player:
     def check_fits(self, state: State) -> None:
         """Raise ConfigError for a mesh that the padding has no room for."""
         self._observer.check_fits(state.mesh)
+
+    def fits(self, state: State) -> bool:
+        """Whether the padding has room for the mesh."""
+        try:
+            self.check_fits(state)
+        except ConfigError:
+            return False
+        return True
 
     def legal_mask(self, simulator: Simulator, state: State) -> BoolArray:
         """(G,) what may be done: what the codec has room for and the simulator, with its guidance, allows."""
@@ -105,7 +113,7 @@ class Player:
         rng: np.random.Generator | None = None,
         temperature: float = 1.0,
     ) -> Iterator[Track]:
-        """Play on from `track` until the policy stops or the budget is spent; yield every step."""
+        """Play on from `track` until the policy stops, its padding is full or the budget is spent; yield every step."""
         while not track.state.done and not meter.spent():
             following = self._step(simulator, track.state, rng, temperature)
             if following is None:
@@ -113,6 +121,8 @@ class Player:
             meter.add([following])
             track = Track(following, track)
             yield track
+            if not self.fits(following):  # an action and its mirror image may need more room than one has
+                return
 
     def _step(
         self, simulator: Simulator, state: State, rng: np.random.Generator | None, temperature: float

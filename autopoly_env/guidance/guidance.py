@@ -81,9 +81,13 @@ class Guidance:
             raise self._unsymmetric("the mesh")
         return Bonds(locked, images, self.axis)
 
+    def is_symmetric(self, mesh: PolyMesh) -> bool:
+        """Whether the outline is symmetric about the axis, if there is one."""
+        return self.axis is None or images_of(mesh, self.axis) is not None
+
     def check_symmetric(self, mesh: PolyMesh) -> None:
         """Raise ConfigError if symmetry is wished for and the outline has none."""
-        if self.axis is not None and images_of(mesh, self.axis) is None:
+        if not self.is_symmetric(mesh):
             raise self._unsymmetric("the start mesh")
 
     def _unsymmetric(self, what: str) -> ConfigError:

@@ -7,11 +7,12 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
+from autopoly_env.arguments import first_defect, shortened
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import SequenceError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators.action import Choice
-from autopoly_env.operators.elements import corner_position, hole_face
+from autopoly_env.operators.elements import EDGE, corner_position, hole_face
 from autopoly_env.operators.holes import HoleChoice
 
 ChoiceIds = dict[str, Any]
@@ -60,10 +61,38 @@ def _corner_choice(mesh: PolyMesh, corner: int, ids: ChoiceIds) -> Choice:
         raise SequenceError(f"choice {ids}: expected the vertex to split to, {{'to': id}}")
     to = ids["to"]
     if isinstance(to, bool) or not isinstance(to, int) or to < 0:
-        raise SequenceError(f"choice.to is {_short(to)}; give an id, an integer from 0")
+        raise SequenceError(f"choice.to is {shortened(to)}; give an id, an integer from 0")
     links = mesh.topology.links
     face = links.faces[corner]
     return links.offsets[face] + corner_position(mesh, face, to)
+
+
+def _vertex_choice_ids(mesh: PolyMesh, _vertex: int, choice: Choice) -> ChoiceIds:
+    assert isinstance(choice, int | np.integer)
+    return {"to": mesh.vertex_ids[int(choice)]}
+
+
+def _vertex_choice(mesh: PolyMesh, _vertex: int, ids: ChoiceIds) -> Choice:
+    match ids:
+        case {"to": int(to), **rest} if not rest and not isinstance(to, bool):
+            return mesh.vertex_index(to)
+    raise SequenceError(f"choice {shortened(ids)}: expected the vertex to merge with, {{'to': id}}")
+
+
+def _edge_choice_ids(mesh: PolyMesh, _edge: int, choice: Choice) -> ChoiceIds:
+    assert isinstance(choice, int | np.integer)
+    return {"to": [mesh.vertex_ids[v] for v in mesh.edges[int(choice)]]}
+
+
+def _edge_choice(mesh: PolyMesh, _edge: int, ids: ChoiceIds) -> Choice:
+    match ids:
+        case {"to": [int(a), int(b)], **rest} if not rest and not isinstance(a, bool) and not isinstance(b, bool):
+            return EDGE.index(mesh, {"edge": [a, b]})
+    raise SequenceError(f"choice {shortened(ids)}: expected the ends of the edge to fill to, {{'to': [id, id]}}")
+
+
+def _renamed_edge(ids: ChoiceIds, renaming: Renaming) -> ChoiceIds:
+    return {"to": [renaming.vertex(name) for name in ids["to"]]}
 
 
 def _hole_choice_ids(mesh: PolyMesh, hole: int, choice: Choice) -> ChoiceIds:
@@ -79,8 +108,9 @@ def _hole_choice(mesh: PolyMesh, hole: int, ids: ChoiceIds) -> Choice:
     try:
         plan = _HOLE.validate_python(ids)
     except ValidationError as error:
-        defect = error.errors(include_url=False)[0]
-        raise SequenceError(f"choice.{'.'.join(map(str, defect['loc'])) or 'all of it'}: {defect['msg']}") from None
+        defect = first_defect(error)
+        place = ".".join(("choice", *map(str, defect.place or ("all of it",))))
+        raise SequenceError(f"{place}: {defect.problem}") from None
     (a, i), (b, j) = plan.bridges
     face, _ = hole_face(hole)
     return HoleChoice(plan.points, ((corner_position(mesh, face, a), i), (corner_position(mesh, face, b), j)))
@@ -95,10 +125,7 @@ def _renamed_hole(ids: ChoiceIds, renaming: Renaming) -> ChoiceIds:
     return {"points": placed, "bridges": bridges}
 
 
-def _short(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 40 else text[:37] + "..."
-
-
 TO_CORNER = ChoiceCodec(_corner_choice_ids, _corner_choice, lambda ids, r: {"to": r.vertex(ids["to"])})
+TO_VERTEX = ChoiceCodec(_vertex_choice_ids, _vertex_choice, lambda ids, r: {"to": r.vertex(ids["to"])})
+TO_EDGE = ChoiceCodec(_edge_choice_ids, _edge_choice, _renamed_edge)
 OF_HOLE = ChoiceCodec(_hole_choice_ids, _hole_choice, _renamed_hole)

@@ -88,10 +88,19 @@ class ActionCodec:
     def _within_capacity(self, operator: Operator, mesh: PolyMesh) -> BoolArray:
         limits = [CAPACITY_PER_VERTEX[kind] * self.max_vertices for kind in ("vertex", "edge", "face")]
         legal = operator.legal_mask(mesh).copy()
+        if operator.varies is not None:
+            for element in np.flatnonzero(legal).tolist():
+                legal[element] = _fits(mesh, operator.change_at(mesh, element), limits)
+            return legal
         for i, change in enumerate(operator.changes):
-            if any(d > 0 and n + d > limit for n, d, limit in zip(mesh.counts, change, limits, strict=True)):
+            if not _fits(mesh, change, limits):
                 legal[i :: len(operator.changes)] = False
         return legal
+
+
+def _fits(mesh: PolyMesh, change: tuple[int, int, int], limits: Iterable[int]) -> bool:
+    """Whether (V, E, F) stay within the limits, as far as they grow."""
+    return not any(d > 0 and n + d > limit for n, d, limit in zip(mesh.counts, change, limits, strict=True))
 
 
 def legal_actions(mesh: PolyMesh, operators: Iterable[str]) -> list[Action]:

@@ -10,7 +10,7 @@ from autopoly_env.operators.action import Choice
 from autopoly_env.operators.elements import EDGE
 from autopoly_env.operators.operator import Operator
 from autopoly_env.operators.rebuilding import corner_of, refusal, shrunk, without
-from autopoly_env.operators.wording import EDGES, Phrases, begun_with, element_words
+from autopoly_env.operators.wording import EDGES, Gesture, Phrases, begun_with, element_words
 
 
 def dissolvable_edges(mesh: PolyMesh) -> BoolArray:
@@ -69,6 +69,7 @@ edge_dissolve = Operator(
         ),
         "Mesh › Delete › Dissolve Edges",
         "mesh.dissolve_edges",
+        lambda _: Gesture("KK"),
     ),
     blender=_blender,
 )

@@ -14,7 +14,7 @@ from autopoly_env.operators.evidence import Evidence, sane_move
 from autopoly_env.operators.mirroring import again, moved
 from autopoly_env.operators.operator import Mirroring, Operator
 from autopoly_env.operators.rebuilding import ends_along_face, grown, refusal
-from autopoly_env.operators.wording import EDGES, Phrases, begun_with, element_words
+from autopoly_env.operators.wording import EDGES, Gesture, Phrases, begun_with, element_words
 
 OFFSET = 0.25  # of the edge's length
 INSET = 0.25
@@ -107,6 +107,7 @@ edge_extrude = Operator(
         lambda step: (f"{EDGES} edge select, click {element_words(step)}", "`E`: pull the new edge out, click"),
         "Edge › Extrude Edges",
         "mesh.extrude_edges_move",
+        lambda _: Gesture("KPBB", drags=True),
     ),
     blender=_blender,
 )

@@ -13,7 +13,7 @@ from autopoly_env.operators.evidence import Evidence, sane_move
 from autopoly_env.operators.mirroring import again, moved
 from autopoly_env.operators.operator import Mirroring, Operator
 from autopoly_env.operators.rebuilding import corner_of, grown
-from autopoly_env.operators.wording import EDGES, Phrases, begun_with, element_words
+from autopoly_env.operators.wording import EDGES, Gesture, Phrases, begun_with, element_words
 
 
 def any_edge(mesh: PolyMesh) -> BoolArray:
@@ -97,6 +97,7 @@ edge_subdivide = Operator(
         ),
         "Edge › Subdivide",
         "mesh.subdivide",
+        lambda _: Gesture("BBPBB"),
     ),
     blender=_blender,
 )

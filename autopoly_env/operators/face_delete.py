@@ -12,7 +12,7 @@ from autopoly_env.operators.elements import FACE
 from autopoly_env.operators.mirroring import again
 from autopoly_env.operators.operator import Mirroring, Operator
 from autopoly_env.operators.rebuilding import refusal, shrunk, without
-from autopoly_env.operators.wording import FACES, Phrases, Told, begun_with, count, element_words
+from autopoly_env.operators.wording import FACES, Gesture, Phrases, Told, begun_with, count, element_words
 
 
 def any_face_but_the_last(mesh: PolyMesh) -> BoolArray:
@@ -64,6 +64,7 @@ face_delete = Operator(
         lambda step: (f"{FACES} face select, click {element_words(step)}", "`X` › Faces"),
         "Mesh › Delete › Faces",
         "mesh.delete",
+        lambda _: Gesture("KPBB"),
     ),
     blender=_blender,
 )

@@ -17,7 +17,7 @@ from autopoly_env.operators.holes import HoleChoice, default_hole, hole_defect, 
 from autopoly_env.operators.mirroring import again
 from autopoly_env.operators.operator import Mirroring, Operator
 from autopoly_env.operators.rebuilding import corners_from_last, grown, refusal
-from autopoly_env.operators.wording import FACES, Phrases, Told
+from autopoly_env.operators.wording import FACES, Gesture, Phrases, Told
 
 TINY_AREA = 1e-6  # unit square; 1/16 of a pixel at 256 x 256
 _RIM_PROMISE = 0.1  # of an excess that an edge answers for, left to a hole
@@ -197,6 +197,12 @@ def _keys(step: Told) -> tuple[str, ...]:
     )
 
 
+def _gesture(step: Told) -> Gesture:
+    """The knife: a corner, the hole's corners and its first once more, the other corner; then the face inside."""
+    sides = int(step.element["sides"])
+    return Gesture("K" + (sides + 3) * "PBB" + "K" + "PBB" + "KPBB")
+
+
 def _blender(mesh: PolyMesh, element: int, choice: Choice | None) -> list[Any]:
     assert isinstance(choice, HoleChoice)
     face, _ = hole_face(element)
@@ -218,6 +224,6 @@ face_hole = Operator(
     promise=_promise,
     mirror=_mirror,
     sources=_sources,
-    phrases=Phrases("Cut a hole", _done, _keys, "Mesh › Knife Tool", "mesh.knife_tool"),
+    phrases=Phrases("Cut a hole", _done, _keys, "Mesh › Knife Tool", "mesh.knife_tool", _gesture),
     blender=_blender,
 )

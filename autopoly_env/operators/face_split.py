@@ -12,7 +12,7 @@ from autopoly_env.operators.choices import TO_CORNER
 from autopoly_env.operators.elements import CORNER
 from autopoly_env.operators.operator import Operator
 from autopoly_env.operators.rebuilding import corner_of, corners_from_last, grown, refusal
-from autopoly_env.operators.wording import VERTICES, Phrases, Told
+from autopoly_env.operators.wording import VERTICES, Gesture, Phrases, Told
 
 
 def corners_with_diagonal(mesh: PolyMesh) -> BoolArray:
@@ -99,6 +99,7 @@ face_split = Operator(
         ),
         "Vertex › Connect Vertex Path",
         "mesh.vert_connect_path",
+        lambda _: Gesture("K", n_selected=2),
     ),
     blender=_blender,
 )

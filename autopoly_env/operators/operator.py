@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
-from typing import Any, SupportsIndex
+from typing import Any, SupportsFloat, SupportsIndex
 
 import numpy as np
 
@@ -28,10 +28,6 @@ _REMOVAL_PROMISE = 0.02  # of the largest blame: nothing can be known of a remov
 
 def _nothing_to_choose(_mesh: PolyMesh, _element: int) -> None:
     return None
-
-
-def _listed(begin: Callable[[Evidence, int], Iterator[Start]], evidence: Evidence, element: int) -> list[Start]:
-    return list(begin(evidence, element))
 
 
 def _always(_mesh: PolyMesh, _element: int) -> bool:
@@ -65,6 +61,8 @@ class Operator:
     # What is left free: what `apply` chooses by default, and how a sequence writes it; None where nothing is
     choose: Callable[[PolyMesh, int], Choice | None] = _nothing_to_choose
     choice: ChoiceCodec | None = None
+    # At most, of (V, E, F), where that is not one number for all elements or choices; None: as `changes` says
+    varies: Callable[[PolyMesh, int], tuple[int, int, int]] | None = None
     # Whether it changes what is rendered; if not, a refit has nothing to gain
     shows: Callable[[PolyMesh, int], bool] = _always
     # Starts of a refit at what the picture still misses, or shows too much of, before the operator's own
@@ -87,6 +85,10 @@ class Operator:
     def module(self) -> str:
         """The module that it comes from, for messages."""
         return str(getattr(self.edit, "__module__", "an unknown module"))
+
+    def change_at(self, mesh: PolyMesh, element: int) -> tuple[int, int, int]:
+        """The change of (V, E, F), at most, when it works on an element."""
+        return self.changes[element % len(self.changes)] if self.varies is None else self.varies(mesh, element)
 
     @property
     def removes(self) -> bool:
@@ -121,29 +123,49 @@ class Operator:
         n = self.element.count(mesh)
         if not 0 <= element < n:
             raise refusal(self.name, self.element.name, element, f"the mesh has {n}; give 0..{n - 1}")
-        chosen = self._own(self.choose, mesh, int(element)) if choice is None else choice
+        chosen = self.choice_at(mesh, int(element)) if choice is None else choice
         made: PolyMesh = self._own(self.edit, mesh, int(element), chosen)
         if not isinstance(made, PolyMesh):
             raise self._broken(f"it made a {type(made).__name__}; expected a PolyMesh")
         return made
 
+    def choice_at(self, mesh: PolyMesh, element: int) -> Choice | None:
+        """What `apply` chooses by default at `element`. Raises as `apply`."""
+        chosen: Choice | None = self._own(self.choose, mesh, element)
+        return chosen
+
+    def shows_at(self, mesh: PolyMesh, element: int) -> bool:
+        """Whether it changes what is rendered. Raises ConformanceError."""
+        return bool(self._own(self.shows, mesh, element))
+
     def starts(self, evidence: Evidence, element: int) -> list[Start]:
         """The meshes from which to refit after it has worked on `element`, one or more. Raises as `apply`."""
         if self.begin is not None:
-            return self._own(_listed, self.begin, evidence, element)
-        choice = self._own(self.choose, evidence.mesh, element)
+            found = self._started(self.begin, evidence, element)
+            if not found:
+                raise self._broken("it begins nowhere; expected one Start or more")
+            return found
+        choice = self.choice_at(evidence.mesh, element)
         return [Start(choice, self.apply(evidence.mesh, element, choice))]
 
+    def mirrored(self, of: Mirroring, start: Start) -> list[Start]:
+        """The start followed by the mirror image of the action, as often as there is room for it. Raises as `apply`."""
+        return [] if self.mirror is None else self._started(self.mirror, of, start)
+
     def promise_of(self, evidence: Evidence, element: int) -> float:
-        """The area (unit square) that it may put right at `element`, at least 0."""
-        if self.promise is not None:
-            return self.promise(evidence, element)
-        return _REMOVAL_PROMISE * max(evidence.most) if self.removes else 0.0
+        """The area (unit square) that it may put right at `element`, at least 0. Raises ConformanceError."""
+        if self.promise is None:
+            return _REMOVAL_PROMISE * max(evidence.most) if self.removes else 0.0
+        promised: float = self._own(self.promise, evidence, element)
+        if not (isinstance(promised, SupportsFloat) and 0.0 <= float(promised) < np.inf):
+            raise self._broken(f"it promises {promised!r:.40}; expected an area of at least 0")
+        return promised
 
     def sources_of(self, before: PolyMesh, element: int, choice: Choice | None, made: PolyMesh) -> FloatArray:
-        """(n, 2) where each of the n vertices that it made grows out of."""
+        """(n, 2) where each of the n vertices that it made grows out of. Raises ConformanceError."""
         if self.sources is not None:
-            return self.sources(before, element, choice, made)
+            places: FloatArray = self._own(self.sources, before, element, choice, made)
+            return places
         return made.vertices[[v for v, name in enumerate(made.vertex_ids) if name >= before.next_vertex_id]]
 
     def __reduce_ex__(self, protocol: SupportsIndex) -> str | tuple[Any, ...]:
@@ -152,6 +174,14 @@ class Operator:
             if value is self:
                 return _found_at, (self.module, name)
         return super().__reduce_ex__(protocol)
+
+    def _started(self, begin: Callable[..., Iterator[Start]], *arguments: Any) -> list[Start]:
+        """The starts that one of the operator's functions gives, one after the other."""
+        found: list[Start] = self._own(lambda: list(begin(*arguments)))
+        odd = [one for one in found if not (isinstance(one, Start) and isinstance(one.mesh, PolyMesh))]
+        if odd:
+            raise self._broken(f"it begins at {odd[0]!r:.40}; expected a Start with a PolyMesh")
+        return found
 
     def _own(self, call: Callable[..., Any], *arguments: Any) -> Any:
         """What one of the operator's functions returns; whatever else it raises is told in one line."""

@@ -4,19 +4,23 @@ from collections.abc import Iterable
 
 from autopoly_env import outside
 from autopoly_env.errors import ConfigError
+from autopoly_env.operators.edge_cap import edge_cap
 from autopoly_env.operators.edge_dissolve import edge_dissolve
 from autopoly_env.operators.edge_extrude import edge_extrude
+from autopoly_env.operators.edge_fill import edge_fill
 from autopoly_env.operators.edge_subdivide import edge_subdivide
 from autopoly_env.operators.face_delete import face_delete
 from autopoly_env.operators.face_hole import face_hole
 from autopoly_env.operators.face_split import face_split
 from autopoly_env.operators.operator import Operator
 from autopoly_env.operators.vertex_dissolve import vertex_dissolve
+from autopoly_env.operators.vertex_merge import vertex_merge
 
 _PAPER = (edge_subdivide, edge_extrude, face_split, face_delete)
 _FULL = (*_PAPER, face_hole, vertex_dissolve, edge_dissolve)
-PRESETS: dict[str, tuple[Operator, ...]] = {"paper": _PAPER, "full": _FULL}
-OPERATORS: dict[str, Operator] = {operator.name: operator for operator in _FULL}  # all that this process knows
+_MODELLER = (edge_extrude, edge_cap, edge_fill, vertex_merge, face_delete, vertex_dissolve, edge_dissolve)
+PRESETS: dict[str, tuple[Operator, ...]] = {"paper": _PAPER, "full": _FULL, "modeller": _MODELLER}
+OPERATORS: dict[str, Operator] = {operator.name: operator for operator in (*_FULL, *_MODELLER)}  # all that are known
 
 
 def register(operator: Operator) -> Operator:

@@ -12,7 +12,7 @@ from autopoly_env.operators.elements import VERTEX
 from autopoly_env.operators.mirroring import again
 from autopoly_env.operators.operator import Mirroring, Operator
 from autopoly_env.operators.rebuilding import corner_of, refusal, shrunk, without
-from autopoly_env.operators.wording import VERTICES, Phrases, begun_with, element_words
+from autopoly_env.operators.wording import VERTICES, Gesture, Phrases, begun_with, element_words
 
 
 def dissolvable_vertices(mesh: PolyMesh) -> BoolArray:
@@ -75,6 +75,7 @@ vertex_dissolve = Operator(
         ),
         "Mesh › Delete › Dissolve Vertices",
         "mesh.dissolve_verts",
+        lambda _: Gesture("KK"),
     ),
     blender=_blender,
 )

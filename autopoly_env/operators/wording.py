@@ -4,6 +4,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from autopoly_env.errors import ConfigError
+
 EDGES, FACES, VERTICES = "`2`", "`3`", "`1`"  # Blender's select modes
 
 
@@ -21,6 +23,30 @@ class Told(Protocol):
 
 
 @dataclass(frozen=True)
+class Gesture:
+    """What the hand does for a step in Blender, in the letters of the keystroke-level model.
+
+    K is a key, P is pointing somewhere, B is a mouse button going down or up, M is making up one's mind (Card, Moran
+    and Newell 1980): a click on something is PBB. Raises ConfigError for other letters and for less than no element.
+    """
+
+    strokes: str = "BBPBB"  # from having selected to being done; a command of the context menu, if nothing is known
+    n_selected: int = 1  # elements that are selected beforehand
+    drags: bool = False  # whether it ends with dragging what is new, out of its sources, to where it is wanted
+
+    def __post_init__(self) -> None:
+        if set(self.strokes) - set("KPBM"):
+            raise ConfigError(f"strokes {self.strokes!r}: expected letters of K, P, B and M, such as KPBB")
+        if self.n_selected < 0:
+            raise ConfigError(f"n_selected {self.n_selected}: expected 0 or more elements")
+
+
+def from_a_menu(_step: Told) -> Gesture:
+    """The gesture of an operator of which nothing is known: one element is selected, a command taken from a menu."""
+    return Gesture()
+
+
+@dataclass(frozen=True)
 class Phrases:
     """What there is to say about the steps of one operator; keys to press stand between backticks."""
 
@@ -29,6 +55,7 @@ class Phrases:
     keys: Callable[[Told], tuple[str, ...]]  # what to do in Blender's edit mode, one after the other
     menu: str  # where Blender has the same in its menus
     blender: str  # the name of Blender's operator
+    gesture: Callable[[Told], Gesture] = from_a_menu  # what `keys` cost the hand (docs/lessons.md)
 
 
 def element_words(step: Told) -> str:

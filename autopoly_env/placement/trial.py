@@ -37,7 +37,7 @@ def tried(disagreement: Disagreement, action: Action, axis: float | None = None)
     if not 0 <= action.element < n:
         kind = operator.element.name
         raise refusal(operator.name, kind, action.element, f"the mesh has {n}; give 0..{n - 1}")
-    starts, shows = operator.starts(disagreement, action.element), operator.shows(mesh, action.element)
+    starts, shows = operator.starts(disagreement, action.element), operator.shows_at(mesh, action.element)
     if axis is not None:
         starts = _symmetric(disagreement, action, operator, starts, shows, axis)
     return Trial(action, starts, shows)
@@ -63,9 +63,8 @@ def _symmetric(
 def _mirrored(mesh: PolyMesh, action: Action, operator: Operator, plain: list[Start], axis: float) -> Iterator[Start]:
     images = images_of(mesh, axis)
     assert images is not None
-    if operator.mirror is not None:
-        for start in plain:
-            yield from operator.mirror(Mirroring(mesh, images, axis, action), start)
+    for start in plain:
+        yield from operator.mirrored(Mirroring(mesh, images, axis, action), start)
 
 
 def _is_as_sane(made: PolyMesh, before: Disagreement) -> bool:

@@ -5,6 +5,10 @@ crosses; a *piece* lies in one cell and adds its signed area to that cell and it
 it (the accumulation of font rasterisers). Cells that hold a piece are *touched*: a bit set marks them, and between two
 touched cells of a row the coverage is constant, so prefix sums of the target give the squared error of the span.
 
+Five kernels walk over the touched cells of each row, bit by bit, each with the loop written out. A function that gives
+the next touched column would be shorter and give the same, but takes 1.05 times as long (loss and gradient; the normal
+equations 1.04; medians over 8 and 32 corners at 64, 128 and 256 pixels a side).
+
 Letters: V vertices, B directed boundary edges, R pixels a side. All positions here are in pixels unless said otherwise.
 """
 

@@ -11,7 +11,6 @@ from autopoly_env.refit.refitting import (
     RefitTarget,
     holding,
     refit,
-    refit_many,
 )
 from autopoly_env.refit.tuning import tune
 
@@ -26,6 +25,5 @@ __all__ = [
     "RefitTarget",
     "holding",
     "refit",
-    "refit_many",
     "tune",
 ]

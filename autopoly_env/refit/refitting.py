@@ -11,14 +11,12 @@ Letters: V vertices, R pixels a side. The loss is the sum over pixels of (covera
 each pixel times its weight where the target has weights.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 
 from autopoly_env.arrays import BoolArray, IntArray
-from autopoly_env.compute import map_threads
 from autopoly_env.errors import MeshError
 from autopoly_env.mesh import PolyMesh, Topology
 from autopoly_env.raster import picture_of, workspace
@@ -134,11 +132,6 @@ def _with_background(target: Target, background: float) -> Target:
         return target
     weights = target.coverage + background * (1.0 - target.coverage)
     return Target(target.coverage, weights if target.weights is None else weights * target.weights)
-
-
-def refit_many(meshes: Iterable[PolyMesh], target: RefitTarget, config: RefitConfig = DEFAULT) -> list[RefitResult]:
-    """`refit` of many meshes on all cores; the result does not depend on how many there are."""
-    return map_threads(lambda mesh: refit(mesh, target, config), meshes)
 
 
 def _bound(shape: Shape, bonds: Bonds) -> Shape:

@@ -6,14 +6,16 @@ from dataclasses import asdict, dataclass
 from typing import Annotated, Any, NoReturn
 
 import numpy as np
-from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import AfterValidator, ConfigDict, Field, TypeAdapter, ValidationError
 
-from autopoly_env.arguments import first_defect
+from autopoly_env.arguments import first_defect, shortened
 from autopoly_env.errors import MeshError, SequenceError
 from autopoly_env.mesh import PolyMesh, Topology, validate
 
 FORMAT = "autopoly-construction-sequence"
-VERSION = 1
+VERSION = 2  # of sequences whose steps say which part they work on; all others are written as version 1
+VERSIONS = (1, VERSION)
+MOST_LABEL = 60  # characters
 SCORE_KEYS = ("iou", "complexity", "self_intersections", "total")
 
 Id = Annotated[int, Field(strict=True, ge=0)]
@@ -22,13 +24,24 @@ Score = dict[str, Annotated[int, Field(strict=True)] | Number]  # at least SCORE
 _STRICT = ConfigDict(extra="forbid")
 
 
+def check_label(label: str) -> str:
+    """The label of a part as it is. Raises ValueError if it is not 1 to `MOST_LABEL` printable characters, trimmed."""
+    if not 0 < len(label) <= MOST_LABEL or not label.isprintable() or label != label.strip():
+        raise ValueError(f"expected 1 to {MOST_LABEL} printable characters, no space around them")
+    return label
+
+
+Label = Annotated[str, Field(strict=True), AfterValidator(check_label)]
+
+
 @dataclass(frozen=True)
 class Step:
     """One action and what came of it; vertices and faces go by their ids.
 
     `element` is {"edge": [a, b]}, {"face": f}, {"face": f, "vertex": v} for a corner, {"vertex": v}, or
     {"face": f, "sides": k} for a hole. `choice` is {"to": v} for `face_split`, {"points": [[x, y], ...],
-    "bridges": [[v, hole corner], [v, hole corner]]} for `face_hole`, otherwise None.
+    "bridges": [[v, hole corner], [v, hole corner]]} for `face_hole`, otherwise None. `part` is a label such as "left
+    leg 2", the same for all steps of a part, or None where nobody has said.
     """
 
     __pydantic_config__ = _STRICT
@@ -40,6 +53,7 @@ class Step:
     removed: dict[str, list[Id]]
     moved: tuple[tuple[Id, Number, Number], ...]  # (vertex, x, y) wherever the operator itself had put it elsewhere
     score: Score
+    part: Label | None = None
 
 
 @dataclass(frozen=True)
@@ -77,8 +91,9 @@ def dump_json(settings: dict[str, Any], start: PolyMesh, start_score: Score, ste
         start.next_face_id,
         start_score,
     )
-    head = f'{{"format": "{FORMAT}", "version": {VERSION},\n "settings": {plain_json(settings)}'
-    lines = ",\n  ".join(plain_json(asdict(step)) for step in steps)
+    version = VERSION if any(step.part is not None for step in steps) else 1
+    head = f'{{"format": "{FORMAT}", "version": {version},\n "settings": {plain_json(settings)}'
+    lines = ",\n  ".join(plain_json(_plain_step(step)) for step in steps)
     return f'{head},\n "start": {plain_json(asdict(start_document))},\n "steps": [\n  {lines}]}}\n'
 
 
@@ -90,9 +105,9 @@ def parse_json(text: str) -> tuple[dict[str, Any], PolyMesh, Score, tuple[Step, 
         raise SequenceError(f"not JSON ({_one_line(error)}); give a construction sequence as saved") from None
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         found = data.get("format") if isinstance(data, dict) else data
-        raise SequenceError(f"the format is {_short(found)}, not {FORMAT!r}; give a construction sequence")
-    if data.get("version") != VERSION:
-        raise SequenceError(f"the version is {_short(data.get('version'))}; this release reads version {VERSION}")
+        raise SequenceError(f"the format is {shortened(found)}, not {FORMAT!r}; give a construction sequence")
+    if data.get("version") not in VERSIONS:
+        raise SequenceError(f"the version is {shortened(data.get('version'))}; this release reads versions 1 and 2")
     try:
         document = _DOCUMENT.validate_python(data)
     except ValidationError as error:
@@ -116,6 +131,14 @@ def plain_json(value: object) -> str:
         return json.dumps(value, allow_nan=False, default=_plain_number)
     except (TypeError, ValueError) as error:
         raise SequenceError(f"cannot be written as JSON ({_one_line(error)}); give finite numbers") from None
+
+
+def _plain_step(step: Step) -> dict[str, Any]:
+    """The fields of a step; `part` only where there is one."""
+    values = asdict(step)
+    if step.part is None:
+        del values["part"]
+    return values
 
 
 def _plain_number(value: object) -> int | float | bool:
@@ -169,8 +192,3 @@ def _refuse_number(name: str) -> NoReturn:
 
 def _one_line(error: BaseException) -> str:
     return " ".join(str(error).split())
-
-
-def _short(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 40 else text[:37] + "..."

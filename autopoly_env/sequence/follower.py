@@ -13,7 +13,7 @@ import numpy as np
 
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import MeshError, SequenceError
-from autopoly_env.mesh import PolyMesh
+from autopoly_env.mesh import PolyMesh, mirrored
 from autopoly_env.operators import Action, Choice, Operator, operator_named
 from autopoly_env.operators.choices import Renaming
 from autopoly_env.sequence.file import Step
@@ -167,4 +167,4 @@ def moved_to(mesh: PolyMesh, positions: dict[int, tuple[float, float]]) -> PolyM
 def mirror_image(mesh: PolyMesh) -> PolyMesh:
     """The mesh mirrored at x = 1/2, its faces wound the other way so that their areas stay positive."""
     topology = type(mesh.topology)(mesh.topology.n_vertices, tuple(face[::-1] for face in mesh.faces))
-    return replace(mesh, vertices=mesh.vertices * (-1.0, 1.0) + (1.0, 0.0), topology=topology)
+    return replace(mesh, vertices=mirrored(mesh.vertices, 0.5), topology=topology)

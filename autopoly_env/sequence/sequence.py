@@ -16,7 +16,7 @@ from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import STOP, Action, Choice
 from autopoly_env.operators.wording import element_words
 from autopoly_env.sequence import variation
-from autopoly_env.sequence.file import Score, Step, check_score, dump_json, parse_json, plain_json
+from autopoly_env.sequence.file import Score, Step, check_label, check_score, dump_json, parse_json, plain_json
 from autopoly_env.sequence.follower import Place
 from autopoly_env.sequence.ids import choice_ids, decoded, operator_named
 
@@ -105,23 +105,51 @@ class ConstructionSequence:
             raise SequenceError(f"step {k} of a sequence of {len(self.steps)}: give {lowest}..{len(self.steps)}")
         if (moved is not None or choice is not None) + (insert is not None) + drop != 1:
             raise SequenceError("give one edit of a step: moved and choice, or insert, or drop")
-        replayed = self._replayed()
+        replayed, parts = self._replayed(), list(self.parts)
         if insert is not None:
-            return self.record(*variation.with_insertion(replayed, k, insert))
+            parts.insert(k, insert.part)
+            return self.record(*variation.with_insertion(replayed, k, insert)).with_parts(parts)
         if drop:
-            return self.record(*variation.without(replayed, k))
-        return self.record(*variation.with_changes(replayed, k, moved or {}, choice))
+            del parts[k - 1]
+            return self.record(*variation.without(replayed, k)).with_parts(parts)
+        return self.record(*variation.with_changes(replayed, k, moved or {}, choice)).with_parts(parts)
+
+    @property
+    def parts(self) -> tuple[str | None, ...]:
+        """The label of the part that each step works on, None where the sequence does not say."""
+        return tuple(step.part for step in self.steps)
+
+    def with_parts(self, labels: Iterable[str | None]) -> "ConstructionSequence":
+        """The same with other labels, one for each step: "body", "left leg 2", None to say nothing.
+
+        Raises SequenceError for another number of labels and for one that cannot be kept (`check_label`).
+        """
+        labels = tuple(labels)
+        if len(labels) != len(self.steps):
+            raise SequenceError(f"{len(labels)} labels of parts for {len(self.steps)} steps; give one for each step")
+        for number, label in enumerate(labels, 1):
+            try:
+                if label is not None:
+                    check_label(label)
+            except ValueError as error:
+                raise SequenceError(f"step {number}: part is {label!r:.80}: {error}") from None
+        steps = (replace(step, part=label) for step, label in zip(self.steps, labels, strict=True))
+        return replace(self, steps=tuple(steps))
 
     def moved_by(self, place: Callable[[int], Place]) -> "ConstructionSequence":
         """The same steps, the points of mesh number i (0 is the start) going where `place(i)` takes them.
 
         Raises SequenceError naming the step that is illegal then.
         """
-        return self.record(*variation.moved_by(self._replayed(), place))
+        return self.record(*variation.moved_by(self._replayed(), place)).with_parts(self.parts)
 
     def mirrored(self) -> "ConstructionSequence":
-        """The mirror image at x = 1/2: the same actions on mirrored elements. Raises SequenceError as `moved_by`."""
-        return self.record(*variation.mirrored(self._replayed()))
+        """The mirror image at x = 1/2: the same actions on mirrored elements. Raises SequenceError as `moved_by`.
+
+        In the labels of parts, left and right change places.
+        """
+        parts = [label and variation.mirrored_label(label) for label in self.parts]
+        return self.record(*variation.mirrored(self._replayed())).with_parts(parts)
 
     def _replayed(self) -> variation.Replayed:
         return variation.Replayed(self.settings, self._meshes, self.steps)
@@ -187,7 +215,7 @@ class ConstructionSequence:
 def _record_step(mesh: PolyMesh, action: Action, choice: Choice | None, after: PolyMesh, score: Score) -> Step:
     operator, element = operator_named(action.operator), int(action.element)
     if choice is None:
-        choice = operator.choose(mesh, element)
+        choice = operator.choice_at(mesh, element)
     made = operator.apply(mesh, element, choice)
     if made.with_vertices(after.vertices) != after:
         raise SequenceError(f"the mesh after it is not what {action.operator} makes; record every action")
@@ -249,4 +277,5 @@ def _step_words(steps: tuple[Step, ...]) -> str:
     if not steps:
         return "absent"
     (step,) = steps
-    return f"{step.operator} {element_words(step)}, {len(step.moved)} moved, total {step.score['total']:.2f}"
+    part = "" if step.part is None else f"{step.part}: "
+    return f"{part}{step.operator} {element_words(step)}, {len(step.moved)} moved, total {step.score['total']:.2f}"

@@ -8,6 +8,7 @@ actions on the same elements; the points of holes are deformed, too.
 No target is at hand: the meshes are scored against the picture of the last one, whose IoU is 1.
 """
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -117,6 +118,11 @@ def mirrored(old: Replayed) -> Recording:
         _told(i, step, follower.take, step, meshes[i - 1], meshes[i], _mirrored) for i, step in enumerate(old.steps, 1)
     ]
     return _rescored(old.settings, start, taken)
+
+
+def mirrored_label(label: str) -> str:
+    """The label of a part, the words left and right exchanged."""
+    return re.sub(r"\b(left|right)\b", lambda word: {"left": "right", "right": "left"}[word[0]], label)
 
 
 def _rescored(settings: Mapping[str, Any], start: PolyMesh, taken: Sequence[Taken]) -> Recording:

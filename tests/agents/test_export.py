@@ -343,10 +343,12 @@ def test_writer_that_fails__is_one_line_and_the_others_are_written(run: Run, bro
     house().trim(2).save("short.json")
     done = run("long.json", "short.json", "--to", "brought_formats:BROKEN", "--out", "texts")
     assert (done.code, done.out) == (1, "texts/short.txt\n")
-    what = "the writer of broken failed: KeyError: 'long.txt' (brought_formats.py line 10)"
-    assert done.err == f"error: long.json: texts/long.txt: {what}\n"
+    check = "(autopoly_env.conformance.check_format shows where)"
+    what = "the writer of 'broken', of brought_formats, failed: KeyError: 'long.txt' (brought_formats.py line 10)"
+    assert done.err == f"error: long.json: texts/long.txt: {what}; expected a file or an OutputError {check}\n"
     done = run("short.json", "--to", "brought_formats:LAZY")
-    assert (done.code, done.err) == (1, "error: short.json: short.txt: the writer of lazy made no such file\n")
+    what = f"the writer of 'lazy', of brought_formats, made no such file {check}"
+    assert (done.code, done.err) == (1, f"error: short.json: short.txt: {what}\n")
 
 
 def test_listed__is_what_the_formats_say_of_themselves() -> None:

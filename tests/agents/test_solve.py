@@ -34,7 +34,8 @@ QUICK = ("--resolution", "64")
 COLUMNS = ["name", "r_sm", "r_sc", "r_si", "r_all", "actions", "valid", "blocking_in", "moved", "refits", "seconds"]
 RECORD_KEYS = [
     *("image", "name", "agent", "settings", "seed", "r_sm", "r_sc", "r_si", "r_all", "V", "E", "F"),
-    *("actions", "valid", "blocking_in", "moved", "refits", "seconds", "stopped_by", "notes", "files"),
+    *("actions", "valid", "blocking_in", "moved", "quads", "ngons", "concave", "effort", "returns"),
+    *("refits", "seconds", "stopped_by", "notes", "files"),
 ]
 
 
@@ -119,6 +120,32 @@ def test_solve__shows_a_table_with_means_and_names_the_overview_last(run: Run) -
     assert "note: object has 1 hole: mug" in lines
     assert lines[-1] == "Open deep/results/overview.png"
     assert Image.open("deep/results/overview.png").width == 2 * 256
+
+
+def test_columns__are_those_that_are_asked_for(run: Run) -> None:
+    small_image("box.png")
+    small_image("tall.png", box=(20, 4, 40, 60))
+    done = run("box.png", "tall.png", "--agent", "trace", "--columns", "r_all,lesson,F", "--quiet")
+    heads, *_ = (words for line in done.out.splitlines() if (words := line.split()))
+    lesson = ["actions", "valid", "blocking_in", "moved", "quads", "ngons", "concave", "effort", "returns"]
+    assert heads == ["name", "r_all", *lesson, "F"]
+    rows = {words[0]: words for line in done.out.splitlines() if (words := line.split())}
+    assert rows["box"][2:] == ["0", "1.00", rows["box"][4], "0.000", "1.00", "0", "0", "0.0", "0", "1"]
+    assert rows["mean"][4:] == ["0.0", "1.00", rows["mean"][6], "0.000", "1.00", "0.0", "0.0", "0.0", "0.00", "1.0"]
+
+
+@pytest.mark.parametrize(
+    ("columns", "reason"),
+    [
+        ("r_all,beauty", "--columns r_all,beauty: 'beauty' is none; give some of lesson, r_sm, r_sc"),
+        ("moved,lesson", "--columns moved,lesson: moved stands there twice; name it once"),
+    ],
+)
+def test_columns__that_are_none_are_refused_before_the_work(run: Run, columns: str, reason: str) -> None:
+    small_image("box.png")
+    done = run("box.png", "--columns", columns)
+    assert done.code == 2 and reason in done.err
+    assert not Path("out").exists()
 
 
 @pytest.mark.slow

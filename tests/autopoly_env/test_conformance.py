@@ -1,7 +1,9 @@
 """The public checks: they pass what the project ships, and name what is broken in what breaks a rule."""
 
+import itertools
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -9,11 +11,21 @@ import numpy as np
 import pytest
 
 from autopoly_env import conformance
-from autopoly_env.conformance import check_env, check_operator, check_simulator, check_target_source, sample_meshes
+from autopoly_env.conformance import (
+    check_env,
+    check_format,
+    check_operator,
+    check_simulator,
+    check_target_source,
+    sample_meshes,
+)
 from autopoly_env.env import AutoPolyEnv
 from autopoly_env.errors import ConformanceError
+from autopoly_env.export.formats import LISTED, Export, Format, find_format
+from autopoly_env.files import write_atomically
 from autopoly_env.mesh import PolyMesh, is_valid
 from autopoly_env.operators import EDGE, OPERATORS, STOP, Action, Operator
+from autopoly_env.placement import Disagreement, tried
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator, State
 from autopoly_env.targets import ConstructionTargets, ObjectTargets
@@ -112,6 +124,38 @@ def test_operator_that_breaks_down__is_named_with_its_module_and_the_check() -> 
         short.legal_mask(PolyMesh.rectangle(0.2, 0.2, 0.8, 0.8))
 
 
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        ({"begin": lambda evidence, e: iter(())}, "it begins nowhere; expected one Start or more"),
+        ({"begin": lambda evidence, e: None}, "TypeError: 'NoneType' object is not iterable"),
+        ({"begin": lambda evidence, e: iter([3])}, "it begins at 3; expected a Start with a PolyMesh"),
+        ({"shows": lambda mesh, e: 1 / 0}, "ZeroDivisionError: division by zero"),
+        ({"mirror": lambda of, start: iter([start.mesh])}, r"it begins at PolyMesh.*; expected a Start"),
+        ({"choose": lambda mesh, e: 1 / 0, "begin": None}, "ZeroDivisionError: division by zero"),
+        ({"edit": lambda mesh, e, choice: None, "begin": None}, "it made a NoneType; expected a PolyMesh"),
+    ],
+    ids=["nowhere", "none", "no-start", "shows", "mirror", "choose", "edit"],
+)
+def test_trial_of_a_broken_operator__names_its_module_and_what_was_expected(
+    change: dict[str, Any], complaint: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    broken = replace(SUBDIVIDE, name="edge_break", **{"edit": lambda m, e, c: SUBDIVIDE.edit(m, e, c), **change})
+    monkeypatch.setitem(OPERATORS, broken.name, broken)
+    disagreement = Disagreement(PolyMesh.rectangle(0.25, 0.25, 0.75, 0.75), ring_target())
+    with pytest.raises(
+        ConformanceError, match=rf"^operator 'edge_break' of .*test_conformance breaks .*{complaint}.*check_operator"
+    ):
+        tried(disagreement, Action(broken.name, 1), axis=0.5)
+
+
+@pytest.mark.parametrize("promised", [float("nan"), -1.0, float("inf"), "much", None])
+def test_promise__that_is_no_area_is_refused(promised: Any) -> None:
+    broken = replace(SUBDIVIDE, promise=lambda evidence, e: promised)
+    with pytest.raises(ConformanceError, match=rf"it promises {promised!r}; expected an area of at least 0"):
+        broken.promise_of(Disagreement(PolyMesh.rectangle(0.25, 0.25, 0.75, 0.75), ring_target()), 0)
+
+
 # --- simulators
 
 
@@ -192,6 +236,54 @@ def test_source_of_ones_own__conforms() -> None:
 def test_broken_source__is_caught_with_the_rule_it_breaks(rule: str) -> None:
     with pytest.raises(ConformanceError, match=rule):
         check_target_source(Source(rule), n=4)
+
+
+# --- formats
+
+
+@pytest.mark.parametrize("name", [name for name, _, _ in LISTED])
+def test_every_format__conforms(name: str) -> None:
+    check_format(find_format(name))
+
+
+def _plain(export: Export, path: Path) -> None:
+    write_atomically(path, str(len(export.sequence.steps)))
+
+
+def _into_what_is_there(export: Export, path: Path) -> None:
+    path.write_text("text")
+
+
+def _littering(export: Export, path: Path) -> None:
+    _plain(export, path)
+    path.with_suffix(".log").touch()
+
+
+def _deaf(export: Export, path: Path) -> None:
+    if path.parent.is_file():
+        return
+    _plain(export, path)
+
+
+_NUMBERS = itertools.count()
+
+BROKEN_WRITERS: dict[str, Callable[[Export, Path], object]] = {
+    "there is no such file": lambda export, path: None,
+    "FileNotFoundError": _into_what_is_there,
+    "more than the file": _littering,
+    "not the same bytes twice": lambda export, path: write_atomically(path, str(next(_NUMBERS))),
+    "is no OutputError": _deaf,
+    "0 steps, .a: ZeroDivisionError": lambda export, path: write_atomically(path, str(1 / len(export.sequence.steps))),
+    "changed the sequence": lambda export, path: (_plain(export, path), export.sequence.settings.update(seen=1)),
+}
+
+
+@pytest.mark.parametrize("rule", BROKEN_WRITERS)
+def test_broken_format__is_caught_with_the_rule_it_breaks(rule: str) -> None:
+    check_format(Format("mine", (".a", ".b"), "a number", _plain))
+    with pytest.raises(ConformanceError, match=rule) as caught:
+        check_format(Format("mine", (".a",), "a number", BROKEN_WRITERS[rule]))
+    assert "format mine" in str(caught.value)
 
 
 # --- environments

@@ -12,10 +12,11 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from autopoly_env import placement
 from autopoly_env.compute import set_threads
 from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.mesh import PolyMesh, defects_of, is_valid
-from autopoly_env.operators import OPERATORS, STOP, Action
+from autopoly_env.operators import OPERATORS, STOP, Action, legal_actions
 from autopoly_env.refit import LOCAL, refit
 from autopoly_env.score import ScoreWeights, score
 from autopoly_env.sequence import ConstructionSequence
@@ -185,8 +186,8 @@ def test_two_parts__come_of_two_extrusions_and_a_deletion() -> None:
 
 @pytest.mark.parametrize("operator", OPERATORS)
 def test_transition__changes_the_topology_as_its_operator_does(operator: str) -> None:
-    game = Simulator(noise(1, 32), resolution=32)
-    state = game.initial(PolyMesh.grid(2, 0.2, 0.3, 0.8, 0.7))
+    game = Simulator(noise(1, 32), resolution=32, operators=OPERATORS.values())
+    state = game.initial(OPERATORS["face_delete"].apply(PolyMesh.grid(2, 0.2, 0.3, 0.8, 0.7), 0))
     children = after_all(game, state, operator)
     assert children
     for child in children:
@@ -318,6 +319,32 @@ def test_transition_all__leaves_out_what_has_no_room() -> None:
     game = simulator(HOUSE)
     state = game.initial(TWO_FACES)
     assert game.transition_all(state, [Action("edge_extrude", 3), Action("face_split", 99)]) == []
+
+
+@pytest.mark.parametrize("symmetry", [None, 0.5])
+def test_transition__asks_placement_once_an_action(symmetry: float | None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is disagreed about is looked at once a state, and every action is tried once."""
+    looked_at: list[PolyMesh] = []
+    asked: list[Action] = []
+
+    def look(mesh: PolyMesh, silhouette: Silhouette) -> placement.Disagreement:
+        looked_at.append(mesh)
+        return placement.Disagreement(mesh, silhouette)
+
+    def ask(disagreement: placement.Disagreement, action: Action, axis: float | None) -> placement.Trial:
+        asked.append(action)
+        return placement.tried(disagreement, action, axis)
+
+    game = simulator(BOTTLE, symmetry=symmetry)
+    state = game.initial()
+    monkeypatch.setattr("autopoly_env.simulator.Disagreement", look)
+    monkeypatch.setattr("autopoly_env.simulator.tried", ask)
+    game.transition(state, Action("edge_subdivide", 1))
+    assert (looked_at, asked) == ([state.mesh], [Action("edge_subdivide", 1)])
+    actions = legal_actions(state.mesh, game.operators)
+    looked_at.clear(), asked.clear()
+    game.transition_all(state, actions)
+    assert (looked_at, asked) == ([state.mesh], actions)
 
 
 def test_transition__leaves_the_state_as_it_was() -> None:

@@ -110,6 +110,7 @@ PREPARED: dict[str, Callable[[Path], None]] = {
     "docs/comparing.md": _evaluated,
     "docs/datasets.md": data_sets,
     "docs/guidance.md": _weights,
+    "docs/lessons.md": _sequence("house.json"),
     "docs/player.md": _sequence("out/padlock/sequence.json"),
     "docs/sequence-format.md": _sequence("house.json"),
     "docs/variations.md": _sequence("house.json"),

@@ -42,11 +42,11 @@ def random_walk(seed: int, operators: str = "full", n_steps: int = 40, shake: fl
 
 
 def walks(min_steps: int = 40, max_steps: int = 60) -> st.SearchStrategy[list[Transition]]:
-    """Walks over both presets, still or shaken."""
+    """Walks over the presets, still or shaken."""
     return st.builds(
         random_walk,
         seed=st.integers(0, 2**32 - 1),
-        operators=st.sampled_from(("paper", "full")),
+        operators=st.sampled_from(("paper", "full", "modeller")),
         n_steps=st.integers(min_steps, max_steps),
         shake=st.sampled_from((0.0, 0.002, 0.02)),
     )

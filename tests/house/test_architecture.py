@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from docs import draw_architecture
 from tests.helpers.paths import ROOT
 
 PACKAGES = ("autopoly_env", "agents", "training")
@@ -185,6 +186,22 @@ def test_files__import_each_other_in_no_circle(house: Graph) -> None:
 
 def test_rooms__stand_on_floors(house: Graph) -> None:
     assert not circle_in(rooms_of(house))
+
+
+def test_floors__are_those_that_the_page_draws(house: Graph) -> None:
+    """Every room is drawn, above all that it imports from."""
+    rooms = {room: others for room, others in rooms_of(house).items() if "." in room}
+    floors = {
+        f"{package}.{room}": (number, -k)
+        for number, package in enumerate(PACKAGES)
+        for k, floor in enumerate(draw_architecture.FLOORS[package])
+        for room in floor
+    }
+    assert rooms.keys() == floors.keys(), "put the rooms where they stand into docs/draw_architecture.py and run it"
+    climbing = [(room, other) for room, others in rooms.items() for other in others - {*PACKAGES}
+                if floors[other] >= floors[room]]  # fmt: skip
+    assert not climbing
+    assert (draw_architecture.PICTURES / "floors.svg").read_text(encoding="utf-8") == draw_architecture.drawing()
 
 
 def test_files__do_not_ask_for_the_face_of_their_own_room(house: Graph) -> None:

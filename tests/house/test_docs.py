@@ -1,9 +1,12 @@
 """The pages are true: their Python runs, their links lead somewhere, their pictures are the ones that are drawn."""
 
+import ast
+import io
 import os
 import re
 import subprocess
 import sys
+import tokenize
 from pathlib import Path
 
 import pytest
@@ -52,6 +55,47 @@ def test_links__lead_to_files_and_headings(page: str) -> None:
         path = (PAGES[page].parent / name).resolve() if name else PAGES[page]
         assert path.exists(), link
         assert not anchor or anchor in headings(path), link
+
+
+PACKAGES = ("autopoly_env", "agents", "training", "benchmarks", "docs", "examples", "tests", "configs")
+FILE = re.compile(rf"(?<![\w./-])((?:{'|'.join(PACKAGES)})/[\w./-]*\w\.(?:py|yaml|md|css|js|html|svg|png))\b")
+MODULE = re.compile(rf"(?<![\w./])((?:{'|'.join(PACKAGES[:-1])})(?:\.\w+)+)(?![\w*])")
+PLACEHOLDER = re.compile(r"NAME|_$|\.md$")  # of a name that stands for several, or of a page
+
+
+def told(path: Path) -> str:
+    """What a file says to people: a page all of it, a source file in its docstrings and comments."""
+    text = path.read_text(encoding="utf-8")
+    if path.suffix != ".py":
+        return text
+    kinds = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+    docstrings = [ast.get_docstring(node) or "" for node in ast.walk(ast.parse(text)) if isinstance(node, kinds)]
+    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+    return "\n".join([*docstrings, *(token.string for token in tokens if token.type == tokenize.COMMENT)])
+
+
+def is_there(name: str) -> bool:
+    """Whether a dotted name is a module, or stands in the file of one."""
+    parts = name.split(".")
+    for k in range(len(parts), 0, -1):
+        place = ROOT.joinpath(*parts[:k])
+        for file in (place.with_suffix(".py"), place / "__init__.py"):
+            if file.is_file():
+                return k == len(parts) or re.search(rf"\b{parts[k]}\b", file.read_text(encoding="utf-8")) is not None
+    return False
+
+
+@pytest.mark.parametrize("package", ["pages", "autopoly_env", "agents", "training", "benchmarks", "docs", "examples"])
+def test_files_and_modules_that_are_named__are_there(package: str) -> None:
+    for path in PAGES.values() if package == "pages" else sorted((ROOT / package).rglob("*.py")):
+        if path.name == "CHANGELOG.md":  # which also names what was there
+            continue
+        text = told(path)
+        files = [name for name in FILE.findall(text) if not PLACEHOLDER.search(name.removesuffix(".md"))]
+        # tests are named from their folder on, too
+        lost = [name for name in files if not (ROOT / name).exists() and not (ROOT / "tests" / name).exists()]
+        lost += [name for name in MODULE.findall(text) if not PLACEHOLDER.search(name) and not is_there(name)]
+        assert not lost, f"{path}: {lost}"
 
 
 def headings(path: Path) -> set[str]:

@@ -19,6 +19,7 @@ from training.records import MeshData, Outcome, Record, RunInfo, target_path
 from training.report.axes import x_axis, y_axis
 from training.report.comparison import read_runs, rows_of
 from training.report.gallery import worst_cards
+from training.report.lessons import is_told, lessons_markdown
 from training.report.statistics import bootstrap_mean
 
 NASTY = '</script><b>"it\'s" & `${1}`\n|x|'
@@ -145,6 +146,21 @@ def test_axis__places_by_the_logarithm_and_keeps_what_is_beyond_at_its_end() -> 
     assert len(x_axis(3.0, 3.0).ticks()) > 1
 
 
+def test_lessons__are_means_over_the_targets_of_which_they_are_known(tmp_path: Path) -> None:
+    told = [replace(outcome(50.0), effort=seconds, returns=0, quads=1.0) for seconds in (10.0, 20.0)]
+    records = [Record("a", name, 0, one) for name, one in zip("xy", told, strict=True)]
+    records += records_of("a", {"z": 50.0}) + records_of("older", {"x": 1.0, "y": 2.0})
+    first, older = rows_of(read_runs([write_run(tmp_path / "run", records)]))
+    assert first.means["effort"].mean == 15.0 and first.means["quads"] == pytest.approx((1.0, 1.0, 1.0))
+    assert np.isnan(first.means["moved"].mean) and np.isnan(older.means["effort"].mean)
+    assert first.means["actions"].mean == 0.0
+    assert [is_told(row) for row in (older, first)] == [False, True]
+    assert lessons_markdown([older]) == ""
+    heads, _, line = lessons_markdown([older, first]).splitlines()[-3:]
+    cells = dict(zip(heads.split(" | "), line.split(" | "), strict=True))
+    assert (cells["| agent"], cells["effort"], cells["moved"], cells["quads"]) == ("| a", "15.0", "–", "1.00")
+
+
 # --- the command
 
 
@@ -161,6 +177,19 @@ def test_compare__writes_page_markdown_and_csv_that_agree(run: Run, tmp_path: Pa
     assert "| a | 2 | 0 |" in text and "| b\\|c | 1 | 0 |" in text and "20.00 [10.00, 30.00]" in text
     page = Path("deep/report.html").read_text()
     assert "20.00" in page and "b|c" in page and "http" not in page.replace("http-equiv", "")
+
+
+def test_report__tells_how_constructions_read_where_records_do(run: Run, tmp_path: Path) -> None:
+    write_run(tmp_path / "older", records_of("a", {"x": 10.0}))
+    assert run("older", "--out", "older.html").code == 0
+    assert "How the constructions read" not in Path("older.html").read_text() + Path("older.md").read_text()
+    told = [Record("a", "x", 0, replace(outcome(10.0), effort=46.07, returns=3, quads=0.5))]
+    write_run(tmp_path / "newer", told)
+    assert run("newer", "--out", "newer.html").code == 0
+    assert "46.1<small>46.1 … 46.1</small>" in Path("newer.html").read_text()
+    assert "| 46.1 | 3.00 |" in Path("newer.md").read_text()
+    record = json.loads(run("newer", "--json").out)
+    assert (record["effort"], record["returns"], record["concave"]) == (46.07, 3.0, None)
 
 
 def test_json__prints_a_record_an_agent(run: Run, tmp_path: Path) -> None:

@@ -123,10 +123,27 @@ def test_run_folder__has_the_suite_the_targets_and_whole_lines(run: Run) -> None
     assert sorted(os.listdir("out/targets")) == [f"{name}.png" for name in names]
     assert list(lines("out")[0]) == [
         *("agent", "target", "seed", "r_sm", "r_sc", "r_si", "r_all", "V", "E", "F", "flipped_faces"),
-        *("n_actions", "n_refits", "seconds", "stopped_by", "curve", "mesh", "valid", "blocking_in", "moved", "error"),
+        *("n_actions", "n_refits", "seconds", "stopped_by", "curve", "mesh", "valid", "blocking_in", "moved"),
+        *("quads", "ngons", "concave", "effort", "returns", "error"),
     ]
     assert all(line["curve"] for line in lines("out") if line["agent"] == "trace")
     assert not any(line["curve"] for line in lines("out") if line["agent"] == "thrifty")  # on another scale
+
+
+def test_columns__show_how_the_constructions_read(run: Run) -> None:
+    done = run("tiny.yaml", "--out", "out", "--columns", "r_all,quads,effort")
+    heads = next(words for line in done.out.splitlines() if (words := line.split()))
+    assert heads == ["agent", "shapes", "r_all", "quads", "effort", "won–tied–lost"]
+    rows = {row["agent"]: row for row in table("out")}
+    for label in LABELS:
+        told = [line for line in lines("out") if line["agent"] == label]
+        for name in ("quads", "effort", "returns", "concave"):
+            assert float(rows[label][name]) == pytest.approx(np.mean([line[name] for line in told]))
+    text = Path("out/table.md").read_text()
+    assert "| agent | shapes | r_sm |" in text and "| agent | actions | valid | blocking_in | moved | quads |" in text
+    refused = run("tiny.yaml", "--out", "other", "--columns", "beauty")
+    assert refused.code == 2 and "--columns beauty: 'beauty' is none; give some of lesson, r_sm" in refused.err
+    assert not Path("other").exists()
 
 
 def test_table__has_the_means_the_duel_and_what_is_missing_or_printed(run: Run) -> None:

@@ -4,16 +4,8 @@ import time
 from collections import Counter, defaultdict
 
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    SpinnerColumn,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
 
+from agents.commands.progress import TASK, progress_bar
 from training.evaluation.tasks import EvalTask
 from training.records import Record
 
@@ -29,21 +21,7 @@ class Display:
         self.n_failed = 0
         self._quiet = quiet
         self._console = Console(stderr=True)
-        self._bar = Progress(
-            SpinnerColumn(),
-            MofNCompleteColumn(),
-            BarColumn(bar_width=20),
-            TimeElapsedColumn(),
-            TextColumn("left"),
-            TimeRemainingColumn(elapsed_when_finished=False),
-            TextColumn("{task.description}", markup=False),
-            console=self._console,
-            disable=quiet or not self._console.is_terminal,
-            redirect_stdout=False,
-            transient=True,
-            speed_estimate_period=300.0,
-        )
-        self._row = self._bar.add_task("", total=n_tasks, completed=n_done)
+        self._bar = progress_bar(n_tasks, n_done=n_done, is_hidden=quiet, shows_left=True, console=self._console)
         self._n_tasks, self._n_done, self._n_new = n_tasks, n_done, 0
         self._began = self._said = time.monotonic()
         self._in_work: dict[tuple[str, str, int], None] = {}
@@ -60,7 +38,7 @@ class Display:
     def begun(self, task: EvalTask) -> None:
         """A worker has a task."""
         self._in_work[_key(task)] = None
-        self._bar.update(self._row, description=self._text())
+        self._bar.update(TASK, description=self._text())
 
     def done(self, task: EvalTask, record: Record) -> None:
         """A task is over and recorded."""
@@ -74,7 +52,7 @@ class Display:
         else:
             self._sums[record.agent] += record.outcome.r_all
             self._counts[record.agent] += 1
-        self._bar.update(self._row, completed=self._n_done, description=self._text())
+        self._bar.update(TASK, completed=self._n_done, description=self._text())
         now = time.monotonic()
         if not self._console.is_terminal and not self._quiet and now - self._said >= SECONDS_A_LINE:
             self._said = now

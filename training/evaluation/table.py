@@ -1,6 +1,6 @@
 """The table that an evaluation ends with: means of each agent, what is missing, and what was printed elsewhere."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -9,9 +9,11 @@ from autopoly_env.files import write_atomically
 from training.evaluation.suite import GROUND_TRUTH, Printed, Suite
 from training.records import Record
 from training.report.comparison import Comparison, Row, Run, Series, rows_of
+from training.report.lessons import lessons_markdown
 from training.report.table import (
     ENDS,
     FORMATS,
+    LESSON_FORMATS,
     NONE,
     Cell,
     Line,
@@ -23,7 +25,7 @@ from training.report.table import (
     mean_cell,
 )
 
-HEADS = ("agent", "shapes", *FORMATS, "won–tied–lost")
+KNOWN = FORMATS | LESSON_FORMATS  # the columns that a table can show
 PRINTED_FORMATS = {"r_sm": ".3f", "r_sc": ".1f", "r_si": ".1f", "r_all": ".1f"}
 ROUNDING = 0.25  # r_all points by which the sum of printed parts may miss the printed sum
 
@@ -102,30 +104,37 @@ def _is_off(printed: Printed, suite: Suite) -> bool:
 def write_tables(folder: Path, table: RunTable) -> None:
     """Write RUN/table.md and RUN/table.csv. Raises OutputError."""
     notes = "".join(f"- {note}\n" for note in table.notes)
-    text = f"# {table.suite.name}\n\n{as_markdown(HEADS, lines_of(table))}\n{notes}"
+    text = f"# {table.suite.name}\n\n{as_markdown(heads_of(FORMATS), lines_of(table, FORMATS))}\n{notes}"
+    reading = lessons_markdown([row.means for row in table.rows if row.means])
+    text += f"\n{reading}" if reading else ""
     write_atomically(folder / "table.md", text)
     write_atomically(folder / "table.csv", as_csv(records_of(table)))
 
 
-def lines_of(table: RunTable) -> list[Line]:
-    """What the table shows, in the columns HEADS."""
+def heads_of(columns: Iterable[str]) -> tuple[str, ...]:
+    """What stands above the columns of a table: some of KNOWN, and what every table has."""
+    return ("agent", "shapes", *columns, "won–tied–lost")
+
+
+def lines_of(table: RunTable, columns: Collection[str]) -> list[Line]:
+    """What the table shows, in the columns `heads_of(columns)`."""
     lines = []
     for row in table.rows:
-        lines.append(Line(_cells(row, table)))
+        lines.append(Line(_cells(row, table, columns)))
         if row.printed:
-            figures = [format(getattr(row.printed, name), form) for name, form in PRINTED_FORMATS.items()]
-            figures[-1] += "†" if _is_off(row.printed, table.suite) else ""
-            cells = [Cell(text) for text in ("  in print", "", *figures, "", "", "")]
+            figures = {name: format(getattr(row.printed, name), form) for name, form in PRINTED_FORMATS.items()}
+            figures["r_all"] += "†" if _is_off(row.printed, table.suite) else ""
+            cells = [Cell(text) for text in ("  in print", "", *(figures.get(name, "") for name in columns), "")]
             lines.append(Line(cells, is_quoted=True))
     return lines
 
 
-def _cells(row: SuiteRow, table: RunTable) -> list[Cell]:
+def _cells(row: SuiteRow, table: RunTable, columns: Collection[str]) -> list[Cell]:
     means = row.means
     if means is None:
-        return [Cell(row.label, f"({row.missing})"), *(Cell(NONE) for _ in HEADS[1:])]
+        return [Cell(row.label, f"({row.missing})"), *(Cell(NONE) for _ in heads_of(columns)[1:])]
     n_shapes = f"{means.n_targets}" + (f" of {table.n_targets}" if means.n_targets < table.n_targets else "")
-    numbers = [mean_cell(means.means[name], form, ENDS.get(name)) for name, form in FORMATS.items()]
+    numbers = [mean_cell(means.means[name], KNOWN[name], ENDS.get(name)) for name in columns]
     return [Cell(row.label), Cell(n_shapes), *numbers, Cell(duel(means))]
 
 
@@ -138,7 +147,7 @@ def _record(row: SuiteRow) -> dict[str, Any]:
     means = row.means
     record: dict[str, Any] = {"agent": row.label, "note": row.missing}
     record |= {"shapes": means.n_targets, "failed": means.n_failed} if means else {"shapes": 0, "failed": 0}
-    for name in FORMATS:
+    for name in KNOWN:
         record |= interval_record(name, means.means[name] if means else None)
     printed = asdict(row.printed) if row.printed else dict.fromkeys(PRINTED_FORMATS)
     return record | duel_record(means) | {f"printed_{name}": value for name, value in printed.items()}

@@ -125,11 +125,8 @@ def _outcome(mesh: PolyMesh, score: Score, sequence: ConstructionSequence, **wor
         E=n_edges,
         F=n_faces,
         flipped_faces=int((mesh.face_areas() <= 0.0).sum()),
-        n_actions=lesson.n_actions,
         mesh=MeshData.of(mesh),
-        valid=lesson.valid,
-        blocking_in=lesson.blocking_in,
-        moved=lesson.moved,
+        **vars(lesson),
         **work,
     )
 

@@ -115,7 +115,7 @@ def _class_of(action: Action, config: NfapConfig) -> int:
 
 
 def warp_sample(trajectory: Trajectory, k: int, config: WarpConfig, placed: bool) -> Sample:
-    """What WarpNet reads after the action that was taken in state k; see `agents.guided.warp.WarpLabels`.
+    """What WarpNet reads after the action that was taken in state k; see `agents.guided.warp.WarpNet`.
 
     `placed`: new vertices begin where rendering and target disagree, otherwise where the operator puts them. "full" is
     the rendering after the full refit.

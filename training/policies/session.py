@@ -7,13 +7,14 @@ The parts are the log, the curriculum, the evaluation that keeps the best policy
 import math
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import torch
+from rich.progress import Progress
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecEnv
 
+from agents.commands.progress import TASK
 from agents.rl.algorithms import save_checkpoint
 from agents.rl.network import MeshNet
 from agents.rl.policies import net_of
@@ -109,7 +110,7 @@ class Session(BaseCallback):
         self.curriculum = Curriculum(config)
         self.best = BestPolicy(config, folder, state)
         self.checkpoints = Checkpoints(config, folder, state)
-        self.bar: Any = None  # called with the number of steps so far
+        self.bar: Progress | None = None  # of steps
 
     @property
     def is_over(self) -> bool:
@@ -139,7 +140,7 @@ class Session(BaseCallback):
     def _on_step(self) -> bool:
         self.log.add(self.locals["infos"])
         if self.bar is not None:
-            self.bar(self.num_timesteps)
+            self.bar.update(TASK, completed=self.num_timesteps)
         return not self.is_over
 
     def _on_rollout_end(self) -> None:

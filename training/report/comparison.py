@@ -7,11 +7,13 @@ import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from agents.commands.columns import LESSON
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import ConfigError, RunError
 from training.records import Outcome, Record, RunInfo, read_info, read_records, target_path
@@ -39,11 +41,13 @@ class Series:
         """Records that are errors."""
         return sum(record.outcome is None for record in self.records)
 
-    def by_target(self, value: Callable[[Outcome], float]) -> dict[str, float]:
-        """The mean of a value over the seeds of each target."""
+    def by_target(self, value: "Value") -> dict[str, float]:
+        """The mean of a value over the seeds of each target, without those of which it is not known."""
         values: dict[str, list[float]] = {}
         for target, outcome in self.outcomes:
-            values.setdefault(target, []).append(value(outcome))
+            number = value(outcome)
+            if number is not None:
+                values.setdefault(target, []).append(number)
         return {target: float(np.mean(numbers)) for target, numbers in values.items()}
 
 
@@ -95,13 +99,17 @@ class Row:
     is_baseline: bool = False
 
 
-MEANS: dict[str, Callable[[Outcome], float]] = {
+Value = Callable[[Outcome], float | None]
+
+MEANS: dict[str, Value] = {
     "r_sm": lambda outcome: outcome.r_sm,
     "r_sc": lambda outcome: outcome.r_sc,
     "r_si": lambda outcome: outcome.r_si,
     "r_all": lambda outcome: outcome.r_all,
     "refits": lambda outcome: outcome.n_refits,
     "seconds": lambda outcome: outcome.seconds,
+    "actions": lambda outcome: outcome.n_actions,  # this and all that follow tell how the construction reads
+    **{name: attrgetter(name) for name in LESSON if name != "actions"},
 }
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from training.report.comparison import MEANS, Row
+from training.report.lessons import lessons_markdown
 from training.report.statistics import Interval
 from training.report.table import (
     FORMATS,
@@ -56,7 +57,7 @@ def screen_lines(rows: Sequence[Row]) -> list[Line]:
 
 
 def markdown_report(rows: Sequence[Row], baseline: int, notes: Sequence[str]) -> str:
-    """The table as Markdown, the notes below it."""
+    """The table as Markdown, the notes below it, and how the constructions read."""
     heads = ("agent", "targets", "failed", *FORMATS, "wins–ties–losses", "lead")
     lines = []
     for row in rows:
@@ -69,7 +70,8 @@ def markdown_report(rows: Sequence[Row], baseline: int, notes: Sequence[str]) ->
         f"{escaped(rows[baseline].label)}, on the targets of both."
     )
     warnings = (f"Warning: {escaped(note)}." for note in notes)
-    return "\n\n".join([as_markdown(heads, lines).rstrip("\n"), explained, *warnings]) + "\n"
+    reading = [text.rstrip("\n")] if (text := lessons_markdown(rows)) else []
+    return "\n\n".join([as_markdown(heads, lines).rstrip("\n"), explained, *warnings, *reading]) + "\n"
 
 
 def record_of(row: Row) -> dict[str, Any]:

@@ -11,7 +11,9 @@ from training.report.charts import Curves, anytime, curves_of, scatter, scatter_
 from training.report.comparison import MEANS, Comparison, Row
 from training.report.gallery import Card, gallery_of, worst_cards
 from training.report.headline import page_table
+from training.report.lessons import is_told
 from training.report.rendering import own_text, render
+from training.report.table import LESSON_FORMATS
 
 WORK = ("refits", "seconds")
 COMPLEXITY = ("r_sc", "r_si")
@@ -21,6 +23,7 @@ def page_html(comparison: Comparison, rows: Sequence[Row], n_cards: int, title: 
     """The report as HTML text; the gallery has the `n_cards` worst targets."""
     cards = worst_cards(comparison, n_cards)
     labels = [series.label for series in comparison.series]
+    table = page_table(rows, comparison.baseline)
     curves = {work: curves_of(comparison, column) for column, work in enumerate(WORK)}
     return render(
         "page.html",
@@ -31,7 +34,9 @@ def page_html(comparison: Comparison, rows: Sequence[Row], n_cards: int, title: 
         notes=comparison.notes,
         labels=labels,
         baseline=labels[comparison.baseline],
-        table=page_table(rows, comparison.baseline),
+        table=table,
+        lessons=[(i, row) for i, row in table.rows if is_told(row)],
+        lesson_formats=LESSON_FORMATS,
         scatters=[scatter(comparison, value) for value in COMPLEXITY],
         n_shown=len(scatter_points(comparison)),
         n_outcomes=sum(len(series.outcomes) for series in comparison.series),

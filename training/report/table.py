@@ -18,6 +18,10 @@ from training.report.comparison import Row
 from training.report.statistics import Interval
 
 FORMATS = {"r_sm": ".4f", "r_sc": ".1f", "r_si": ".2f", "r_all": ".2f", "refits": ",.0f", "seconds": ".2f"}
+LESSON_FORMATS = {  # of how a construction reads
+    **{"actions": ".1f", "valid": ".2f", "blocking_in": ".3f", "moved": ".3f"},
+    **{"quads": ".2f", "ngons": ".1f", "concave": ".1f", "effort": ".1f", "returns": ".2f"},
+}
 ENDS = {"r_sm": ".3f", "r_sc": ".1f", "r_si": ".2f", "r_all": ".1f"}  # of intervals, where there is little room
 NONE = "–"
 

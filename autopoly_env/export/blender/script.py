@@ -19,7 +19,7 @@ BEGIN, END = "# --- the construction ---\n", "# --- what a step is in Blender --
 DIGITS = 7  # behind the point; Blender's own floats have about as many
 WIDTH = 100  # columns
 
-Place = tuple[float, float]
+Point = tuple[float, float]
 
 
 def save_blender_script(
@@ -99,12 +99,12 @@ def _own_code(sequence: ConstructionSequence) -> list[str]:
     return [f"{code.strip()}\n\n" for name in names if (code := operator_named(name).blender_code)]
 
 
-def _places(mesh: PolyMesh) -> dict[int, Place]:
+def _places(mesh: PolyMesh) -> dict[int, Point]:
     """Where the vertices lie in Blender, by id."""
     return {name: _place(x, y) for name, (x, y) in zip(mesh.vertex_ids, mesh.vertices.tolist(), strict=True)}
 
 
-def _place(x: float, y: float) -> Place:
+def _place(x: float, y: float) -> Point:
     return round(x, DIGITS) + 0.0, round(1.0 - y, DIGITS) + 0.0
 
 

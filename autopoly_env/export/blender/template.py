@@ -115,6 +115,32 @@ def edge_extrude(a: int, b: int) -> None:
     name_new("face", quad)
 
 
+def edge_cap(a: int, b: int) -> None:
+    """A new triangle on the boundary edge a-b: the edge extruded, its copy merged to a point in its middle."""
+    made = bmesh.ops.extrude_edge_only(bm, edges=[edge(a, b)])["geom"]
+    copies = [e for e in made if isinstance(e, bmesh.types.BMVert)]
+    (quad,) = (e for e in made if isinstance(e, bmesh.types.BMFace))
+    quad[FACE_ID] = -1
+    for copy in copies:
+        copy[VERTEX_ID] = -1
+    bmesh.ops.pointmerge(bm, verts=copies, merge_co=(vertex(a).co + vertex(b).co) / 2)
+    name_new("vertex", vertex(-1))
+    name_new("face", face(-1))
+
+
+def edge_fill(a: int, b: int, c: int, d: int) -> None:
+    """A new face between the boundary edges a-b and c-d."""
+    made = bmesh.ops.contextual_create(bm, geom=[edge(a, b), edge(c, d)])["faces"]
+    if not made:  # as it makes none where all corners are corners of one face, in a notch of it
+        made = [bm.faces.new([vertex(name) for name in dict.fromkeys((c, d, a, b))])]
+    name_new("face", made[0])
+
+
+def vertex_merge(name: int, other: int) -> None:
+    """A vertex merged into another one, which stays where it is."""
+    bmesh.ops.weld_verts(bm, targetmap={vertex(name): vertex(other)})
+
+
 def face_split(name: int, a: int, b: int) -> None:
     """A face cut from corner a to corner b; the part that runs counter-clockwise from a to b is the new one."""
     new, _, _ = cut(face(name), vertex(a), vertex(b))

@@ -20,11 +20,12 @@ import numpy as np
 
 from autopoly_env.arrays import FloatArray
 from autopoly_env.export.pictures import picture_url
-from autopoly_env.export.player.words import Words, describe_start, describe_step
+from autopoly_env.export.player.words import Words, describe_lesson, describe_start, describe_step
 from autopoly_env.export.replay import finite_meshes
 from autopoly_env.files import write_atomically
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.sequence import ConstructionSequence, Step
+from autopoly_env.sequence import ConstructionSequence, Lesson, Step, parts_of
+from autopoly_env.sequence.effort import groups_to_move, seconds_of
 from autopoly_env.sequence.file import Score
 from autopoly_env.sequence.ids import decoded
 from autopoly_env.silhouette import Silhouette
@@ -92,12 +93,18 @@ def _title(sequence: ConstructionSequence, target: Silhouette | None) -> str:
 
 def _page_data(sequence: ConstructionSequence, target: Silhouette | None, title: str) -> dict[str, Any]:
     meshes = finite_meshes(sequence)
+    parts = parts_of(sequence)
     steps = [_pose(sequence.start, sequence.start_score, describe_start(sequence.start))]
-    for before, step, after in zip(meshes, sequence.steps, meshes[1:], strict=False):
+    for number, (before, step, after) in enumerate(zip(meshes, sequence.steps, meshes[1:], strict=False), 1):
         motion = _motion(before, step, after)
-        steps.append(_pose(after, step.score, describe_step(step, len(motion["moved"]))) | motion)
+        in_place = set(step.created["vertices"]) if not groups_to_move(step, before, after) else set()
+        n_left = len(set(motion["moved"]) - in_place)
+        steps.append(_pose(after, step.score, describe_step(step, len(motion["moved"]), n_left)) | motion)
+        steps[-1]["seconds"] = round(seconds_of(step, before, after), 2)
+        steps[-1]["part"] = parts.name(number)
     return {
         "title": title,
+        "lesson": describe_lesson(Lesson.of(sequence), len(parts.names)),
         "box": _box(meshes, target),
         "target": None if target is None else picture_url(target, (255, 255, 255), TARGET_SIZE),
         "steps": steps,

@@ -14,6 +14,7 @@
   const data = JSON.parse(byId("data").textContent), steps = data.steps, last = steps.length - 1;
   const stage = byId("stage"), mesh = byId("mesh"), slider = byId("step"), tag = byId("tag");
   const still = matchMedia("(prefers-reduced-motion: reduce)");
+  const hasParts = new Set(steps.slice(1).map(step => step.part)).size > 1; // where all is one part nothing is said of it
   let shown = last, goal = last, playing = false, frame = 0, timer = 0;
   let built = "", elements = [], named = null, unit = 1;
 
@@ -208,8 +209,10 @@
     ["n-vertices", "n-edges", "n-faces"].forEach((id, i) => { byId(id).textContent = step.counts[i]; });
     byId("count").textContent = `${k} / ${last}`;
     byId("which").textContent = k === 0 ? `Before step 1 of ${last}` : which;
+    byId("part").textContent = hasParts && k > 0 ? step.part : "";
     byId("what").textContent = step.title;
     byId("done").textContent = step.done;
+    byId("seconds").textContent = k === 0 ? "" : `, about ${step.seconds.toFixed(0)} s`;
     byId("keys").replaceChildren(...step.keys.map(text => make("li", {}, ...keysOf(text))));
     byId("menu").replaceChildren(make("span", {}, step.menu), make("code", {}, step.blender));
     set(slider, { "aria-valuetext": `${which}, ${step.title}` });
@@ -239,8 +242,10 @@
     const part = (name, text) => make("span", { class: name }, text);
     const button = make("button", { type: "button" }, part("number", k), part("title", step.title), part("gain", gained));
     button.addEventListener("click", () => { stop(); go(k); });
-    return make("li", {}, button);
+    const isFirst = hasParts && k > 0 && step.part !== steps[k - 1].part;
+    return make("li", {}, ...(isFirst ? [make("p", { class: "part" }, step.part)] : []), button);
   }));
+  byId("lesson").replaceChildren(...data.lesson.map(words => make("li", {}, words)));
 
   // --- Motion ---
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import operator_named
 from autopoly_env.operators.wording import VERTICES, count
-from autopoly_env.sequence import Step
+from autopoly_env.sequence import Lesson, Step
 
 
 @dataclass(frozen=True)
@@ -19,14 +19,15 @@ class Words:
     blender: str  # the name of Blender's operator
 
 
-def describe_step(step: Step, n_moved: int) -> Words:
+def describe_step(step: Step, n_moved: int, n_left: int | None = None) -> Words:
     """A step in words, after which `n_moved` vertices are seen to move.
 
+    By hand `n_left` of them have to be moved on their own, all if nothing is said: what an operator drags is in place.
     `step.operator` is one of `OPERATORS`, as in every sequence that replays.
     """
     phrases = operator_named(step.operator).told
     keys = phrases.keys(step)
-    if n_moved:
+    if n_moved if n_left is None else n_left:
         keys += ("`G`: move the green vertices one by one to where they are drawn",)
     return Words(phrases.title, f"{phrases.done(step)} {_moves(n_moved)}", keys, phrases.menu, phrases.blender)
 
@@ -44,6 +45,19 @@ def describe_start(mesh: PolyMesh) -> Words:
     if not is_quad:
         keys = (*keys[:2], f"`E` extrudes and `F` fills until there are {count(n_vertices, 'vertex')} as drawn")
     return Words("Start", done, keys, "Add › Mesh › Plane", "mesh.primitive_plane_add")
+
+
+def describe_lesson(lesson: Lesson, n_parts: int) -> list[str]:
+    """How the whole construction reads, a few words each: how long it takes by hand, its parts, its faces."""
+    words = [f"{lesson.effort:.0f} s by hand"]
+    if n_parts > 1:
+        words += [count(n_parts, "part"), count(lesson.returns, "return")]
+    words.append(f"{100 * lesson.quads:.0f} % quads")
+    if lesson.ngons:
+        words.append(count(lesson.ngons, "n-gon"))
+    if lesson.concave:
+        words.append(f"{lesson.concave} concave")
+    return words
 
 
 def _moves(n: int) -> str:

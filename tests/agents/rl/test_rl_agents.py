@@ -1,6 +1,7 @@
 """Policies as agents: what they may choose, what is refused, how many plays they take, and the search with one."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,10 +9,11 @@ import numpy as np
 import pytest
 import torch
 
-from agents.budget import Budget
+from agents.budget import Budget, Meter
 from agents.registry import AGENTS, make_agent
 from agents.rl.player import Player
 from agents.rl.weights import load_policy, save_policy
+from agents.solution import Track
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import STOP
@@ -162,6 +164,17 @@ def test_a_mesh_that_does_not_fit__is_refused_with_both_numbers(weights: str) ->
     agent, start = make_agent("maskable-ppo", weights=weights), PolyMesh.grid(4, 0.1, 0.1, 0.9, 0.9)
     with pytest.raises(ConfigError, match="25; at most 16 fit max_vertices=16"):
         agent.solve(game(start=start))
+
+
+def test_play__ends_where_an_action_and_its_mirror_image_leave_the_padding() -> None:
+    simulator, spec = game(symmetry=True, operators="edge_subdivide"), replace(SPEC, max_vertices=5)
+    n_vertices = set()
+    for seed in range(6):
+        player = Player(policy(seed, spec))
+        played = list(player.play(simulator, Track(simulator.initial()), Meter.unlimited()))
+        assert all(player.fits(track.state) for track in played[:-1])
+        n_vertices.add(len(played[-1].state.mesh.vertices))
+    assert n_vertices == {5, 6}
 
 
 def test_agents_without_weights__say_so_in_one_line(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -4,18 +4,21 @@ from itertools import pairwise
 from typing import Any
 
 import pytest
+import shapely
 
 from agents.base import Agent, Decision
-from agents.budget import Budget, Progress
+from agents.budget import Budget, Meter, Progress
+from agents.finish import finish
 from agents.registry import make_agent
 from agents.search.config import PAPER, MctsConfig
 from agents.search.incumbents import SHARE, track_of
 from agents.search.mcts import MctsAgent
 from agents.solution import Solution
 from autopoly_env.errors import ConfigError
-from autopoly_env.operators import STOP
+from autopoly_env.operators import STOP, Action
+from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.simulator import Simulator, State
-from tests.helpers.drawings import SQUARE, painted
+from tests.helpers.drawings import BOTTLE, SQUARE, painted
 from tests.helpers.solving import TARGETS, assert_consistent, interrupt_at, quick, simulator
 
 # --- the agents ---
@@ -196,6 +199,41 @@ def test_track_of__goes_through_the_states_of_a_sequence(target: str) -> None:
         assert after.action in game.legal_actions(State(before.mesh, before.score))
     limited = Simulator(game.silhouette, resolution=32, max_steps=len(sequence.steps))
     assert track_of(limited, sequence).state.done in ("max_steps", "matched")
+
+
+def test_track_of__takes_an_action_and_its_mirror_image_for_one_state() -> None:
+    game = Simulator(painted(shapely.Point(0.5, 0.5).buffer(0.35)), resolution=32, symmetry=0.5)
+    played, sequence = _begun(game, 2)
+    track = track_of(game, sequence)
+    assert [state.step for state in track.states()] == [0, 1, 2] and len(sequence.steps) == 4
+    assert track.states()[1].mesh == played[1].mesh and track.state.mesh == sequence.final()
+    assert track.state.halfway == played[-1].halfway
+    assert (
+        track_of(game, sequence.trim(3)).state.mesh == played[1].mesh
+    )  # an action without its mirror image is no state
+
+
+def test_track_of__leaves_out_what_the_simulator_goes_on_from() -> None:
+    earlier = _begun(Simulator(painted(BOTTLE), resolution=32), 1)[1]
+    game = Simulator(painted(BOTTLE), resolution=32, start=earlier)
+    solution = make_agent("greedy").solve(game, Budget(refits=60))
+    states = track_of(game, solution.sequence).states()
+    assert len(states) == len(solution.sequence.steps) > 1 and states[0].mesh == earlier.final()
+    assert (
+        make_agent("mcts", seeds=("greedy",), n_simulations=1).solve(game, Budget(refits=90)).sequence.trim(1).final()
+        == earlier.final()
+    )
+
+
+def _begun(game: Simulator, n_steps: int) -> tuple[list[State], ConstructionSequence]:
+    """Edges subdivided greedily, under symmetry two at a time: the states, and what is recorded of them."""
+    states = [game.initial()]
+    while len(states) <= n_steps:
+        n_edges = len(states[-1].mesh.edges)
+        children = game.transition_all(states[-1], [Action("edge_subdivide", e) for e in range(n_edges)])
+        mirrored = [child for child in children if child.halfway is not None or game.guidance.axis is None]
+        states.append(max(mirrored, key=lambda child: child.score.total))
+    return states, finish(game, states, Meter.unlimited(), keep_steps=True).sequence
 
 
 # --- settings ---

@@ -20,6 +20,7 @@ from autopoly_env.operators import OPERATORS, Action
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import Silhouette
 from tests.helpers.shapes import hourglass, polygon, star
+from tests.helpers.tables import table
 
 QUAD = PolyMesh.rectangle(0.25, 0.125, 0.75, 0.5)
 RING = OPERATORS["face_delete"].apply(PolyMesh.grid(3, 0.1, 0.1, 0.9, 0.9), 4)  # 8 quads around a hole
@@ -164,6 +165,28 @@ def test_sheet_of_a_start_alone__is_one_cell_marked_best() -> None:
     cells = cells_of(page, 1, 220)
     assert len(cells) == 1 and has_colour(cells[0], sheet.ACCENT)
     assert not has_colour(np.asarray(page), viewer.BARE), "no legend for a target that is not there"
+
+
+def test_sheet__names_the_part_of_each_step_where_there_are_several(monkeypatch: pytest.MonkeyPatch) -> None:
+    captions: list[str] = []
+
+    def noted(*drawn: Any, caption: str, **how: Any) -> np.ndarray:
+        captions.append(caption)
+        return draw_mesh(*drawn, caption=caption, **how)
+
+    draw_mesh = viewer.draw_mesh
+    monkeypatch.setattr(viewer, "draw_mesh", noted)
+    contact_sheet(table())
+    assert [caption.split("\n")[:2] for caption in captions] == [
+        ["0  start", "body"],
+        ["1  edge_subdivide", "body"],
+        ["2  edge_subdivide", "body"],
+        ["3  edge_extrude", "lower right, 1 of 2"],
+        ["4  edge_extrude", "lower left, 2 of 2"],
+    ]
+    captions.clear()
+    contact_sheet(table().trim(2))
+    assert [len(caption.split("\n")) for caption in captions] == [2, 2, 2]
 
 
 @pytest.mark.parametrize(("n_steps", "cell"), [(40, 40), (41, 30)])

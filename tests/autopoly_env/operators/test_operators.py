@@ -9,25 +9,13 @@ import pytest
 import shapely
 from hypothesis import HealthCheck, given, settings
 
-from autopoly_env.errors import ConfigError, IllegalActionError
-from autopoly_env.mesh import PolyMesh, canonical_hash, validate
-from autopoly_env.operators import OPERATORS, PRESETS, Choice, HoleChoice, plan_hole, preset, register
+from autopoly_env.errors import ConfigError
+from autopoly_env.mesh import Face, PolyMesh, canonical_hash, validate
+from autopoly_env.operators import OPERATORS, PRESETS, HoleChoice, plan_hole, preset, register
+from tests.helpers.operating import apply, edge, grid, legal, quad, refusal, two_quads
 from tests.helpers.strategies import Transition, walks
 
 L_CORNERS = [(0, 0), (0.5, 0), (0.5, 0.25), (0.25, 0.25), (0.25, 0.5), (0, 0.5)]  # 3 is the reflex one
-
-
-def quad() -> PolyMesh:
-    return PolyMesh.rectangle(0.0, 0.0, 1.0, 1.0)
-
-
-def two_quads() -> PolyMesh:
-    """0-1-2 above 3-4-5: the quads (0, 1, 4, 3) and (1, 2, 5, 4) share edge 1-4."""
-    return PolyMesh.from_faces([(x, y) for y in (0.0, 0.5) for x in (0.0, 0.5, 1.0)], [(0, 1, 4, 3), (1, 2, 5, 4)])
-
-
-def grid() -> PolyMesh:
-    return PolyMesh.grid(3, 0.0, 0.0, 1.0, 1.0)
 
 
 def l_shape() -> PolyMesh:
@@ -39,29 +27,6 @@ def holed_quad() -> PolyMesh:
 
 
 SQUARE_HOLE = HoleChoice(((0.4, 0.4), (0.6, 0.4), (0.6, 0.6), (0.4, 0.6)), ((0, 0), (2, 2)))
-
-
-def apply(name: str, mesh: PolyMesh, element: int, choice: Choice | None = None) -> PolyMesh:
-    made = OPERATORS[name].apply(mesh, element, choice)
-    validate(made)
-    return made
-
-
-def legal(name: str, mesh: PolyMesh) -> list[int]:
-    return np.flatnonzero(OPERATORS[name].legal_mask(mesh)).tolist()
-
-
-def refusal(name: str, mesh: PolyMesh, element: int, choice: Choice | None = None) -> str:
-    """The one line with which an operator refuses."""
-    with pytest.raises(IllegalActionError) as caught:
-        OPERATORS[name].apply(mesh, element, choice)
-    assert str(caught.value).startswith(f"{name} cannot work on {OPERATORS[name].element.name} {element}: ")
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
-
-
-def edge(mesh: PolyMesh, a: int, b: int) -> int:
-    return mesh.edge_index(a, b)
 
 
 @pytest.mark.parametrize(
@@ -88,6 +53,9 @@ def edge(mesh: PolyMesh, a: int, b: int) -> int:
         ("vertex_dissolve", grid(), 0, (15, 23, 9)),
         ("edge_dissolve", two_quads(), 3, (6, 6, 1)),
         ("edge_dissolve", grid(), 3, (16, 23, 8)),
+        ("edge_cap", quad(), 0, (5, 6, 2)),
+        ("edge_cap", two_quads(), 0, (7, 9, 3)),
+        ("edge_cap", grid(), 0, (17, 26, 10)),
     ],
 )
 def test_operator__has_its_effect_on_v_e_f(
@@ -386,7 +354,10 @@ def test_preset__takes_a_name_or_a_list() -> None:
     assert [operator.name for operator in preset("paper")] == [
         "edge_subdivide", "edge_extrude", "face_split", "face_delete",
     ]  # fmt: skip
-    assert preset("full") == tuple(OPERATORS.values()) == PRESETS["full"]
+    assert preset("full") == tuple(OPERATORS.values())[:7] == PRESETS["full"]
+    assert [operator.name for operator in preset("modeller")] == [
+        "edge_extrude", "edge_cap", "edge_fill", "vertex_merge", "face_delete", "vertex_dissolve", "edge_dissolve",
+    ]  # fmt: skip
     assert preset("face_hole, edge_extrude") == (OPERATORS["face_hole"], OPERATORS["edge_extrude"])
     assert preset(["paper", OPERATORS["face_hole"]]) == (*PRESETS["paper"], OPERATORS["face_hole"])
     for wrong in ("papers", "", "edge_extrude,"):
@@ -421,6 +392,7 @@ EFFECTS = {
     "face_split": (0, 1, 1),
     "vertex_dissolve": (-1, -1, 0),
     "edge_dissolve": (0, -1, -1),
+    "edge_cap": (1, 2, 1),
 }
 
 
@@ -434,7 +406,19 @@ def expected_effect(transition: Transition) -> tuple[int, int, int]:
         others = [face for f, face in enumerate(mesh.faces) if f != element]
         stay = set().union(*others), {frozenset(p) for face in others for p in pairwise((*face, face[0]))}
         return len(stay[0]) - mesh.counts[0], len(stay[1]) - mesh.counts[1], -1
+    if name == "edge_fill":
+        return 0, n_new_sides(mesh, transition.made.faces[-1]), 1
+    if name == "vertex_merge":
+        choice = OPERATORS[name].choose(mesh, element) if transition.choice is None else transition.choice
+        ends = [{u for e in mesh.edges.tolist() for u in e if v in e and u != v} for v in (element, choice)]
+        return -1, -len(ends[0] & ends[1]), 0
     return EFFECTS[name]
+
+
+def n_new_sides(mesh: PolyMesh, face: Face) -> int:
+    """How many sides of a face are no edges of the mesh."""
+    edges = {frozenset(pair) for other in mesh.faces for pair in pairwise((*other, other[0]))}
+    return len({frozenset(pair) for pair in pairwise((*face, face[0]))} - edges)
 
 
 def check_topology(mesh: PolyMesh) -> None:

@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from autopoly_env.arrays import FloatArray
-from autopoly_env.compute import set_threads
+from autopoly_env.compute import map_threads, set_threads
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.mesh.geometry_kernels import count_crossings
 from autopoly_env.raster import coverage
 from autopoly_env.raster.raster_kernels import Picture
-from autopoly_env.refit import FROM_AFAR, LOCAL, RefitConfig, RefitResult, RefitTarget, refit, refit_many
+from autopoly_env.refit import FROM_AFAR, LOCAL, RefitConfig, RefitResult, RefitTarget, refit
 from autopoly_env.refit.refitting import shape_of
 from autopoly_env.silhouette import Silhouette, Target
 from tests.helpers.shapes import frame, hourglass, pairs_that_meet, polygon
@@ -236,21 +236,17 @@ def default_threads() -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("default_threads")
-def test_refit_many__equals_refit_bit_for_bit_on_any_number_of_threads() -> None:
+def test_refit__is_the_same_bit_for_bit_beside_others_on_any_number_of_threads() -> None:
     starts = [random_walk(seed, n_steps=8)[-1].after for seed in range(24)] + [hourglass(), SQUARE]
     target = target_of(cornered(0, 9), 64)
     alone = [refit(mesh, target) for mesh in starts]
     for threads in (1, 2, 3):
         set_threads(threads)
-        for one, other in zip(alone, refit_many(iter(starts), target), strict=True):
+        for one, other in zip(alone, map_threads(lambda mesh: refit(mesh, target), starts), strict=True):
             np.testing.assert_array_equal(one.mesh.vertices, other.mesh.vertices)
             assert (one.loss_before, one.loss, one.n_evaluations) == (
                 other.loss_before, other.loss, other.n_evaluations,
             )  # fmt: skip
-
-
-def test_refit_many__of_nothing_is_nothing() -> None:
-    assert refit_many([], target_of(SQUARE, 8)) == []
 
 
 # --- what the kernels are told ---

@@ -3,22 +3,29 @@
 from dataclasses import replace
 
 import pytest
+from hypothesis import assume, given
+from shapely import Polygon
 
 from autopoly_env.conformance import check_simulator
 from autopoly_env.errors import ConfigError
-from autopoly_env.mesh import is_sane
+from autopoly_env.mesh import PolyMesh, is_sane
 from autopoly_env.operators import OPERATORS
 from autopoly_env.score import ScoreWeights
 from autopoly_env.sequence import Lesson
-from autopoly_env.sequence.lesson import moves, share_moved
+from autopoly_env.sequence.follower import mirror_image
+from autopoly_env.sequence.lesson import moves, n_concave, share_moved
 from autopoly_env.simulator import Simulator
 from tests.helpers.constructions import house
 from tests.helpers.drawings import BOTTLE, FRAME, HOUSE, painted
 from tests.helpers.lessons import SQUARE, subdivided
+from tests.helpers.sequences import gabled
+from tests.helpers.strategies import meshes
 
 
 def test_lesson__of_no_steps_is_its_start() -> None:
-    assert Lesson.of(subdivided()) == Lesson(valid=1.0, blocking_in=0.5, moved=0.0, n_actions=0)
+    assert Lesson.of(subdivided()) == Lesson(
+        valid=1.0, blocking_in=0.5, moved=0.0, n_actions=0, quads=1.0, ngons=0, concave=0, effort=0.0, returns=0
+    )
 
 
 def test_lesson__blocking_in_is_the_area_below_the_ious() -> None:
@@ -58,6 +65,36 @@ def test_lesson__valid_is_the_share_of_meshes_that_neither_cross_nor_flip() -> N
     crossed = subdivided(({}, 0.6), ({4: (0.5, 0.9)}, 0.7))  # the new vertex through the opposite edge
     assert Lesson.of(crossed).valid == pytest.approx(2 / 3)
     assert Lesson.of(house()).valid == 1.0
+
+
+def test_lesson__counts_the_faces_of_the_last_mesh_by_their_corners() -> None:
+    wall = Lesson.of(gabled())  # quads [0, 4, 2, 3] and [2, 1, 5, 6], triangle [4, 1, 2]
+    assert (wall.quads, wall.ngons, wall.concave) == (2 / 3, 0, 0)
+    gable = Lesson.of(gabled().trim(1))
+    assert (gable.quads, gable.ngons, gable.concave) == (0.0, 1, 0)
+
+
+@pytest.mark.parametrize(("depth", "concave"), [(0.2, 0), (0.25, 0), (0.25 + 1e-10, 0), (0.25 + 1e-7, 1), (0.4, 1)])
+def test_n_concave__counts_faces_with_a_reflex_corner(depth: float, concave: int) -> None:
+    """The new vertex of the upper edge, which lies at 0.25, pressed in or raised; cross product: width times way."""
+    mesh = subdivided(({4: (0.5, depth)}, 0.6)).final()
+    assert n_concave(mesh) == concave
+    assert n_concave(mirror_image(mesh)) == concave
+
+
+def test_n_concave__judges_a_face_that_is_wound_backwards_as_its_mirror_image() -> None:
+    backwards = SQUARE.with_vertices(SQUARE.vertices[::-1])
+    assert n_concave(backwards) == 0
+
+
+@given(meshes())
+def test_n_concave__is_what_shapely_says_of_simple_faces(mesh: PolyMesh) -> None:
+    """A simple polygon is convex where it fills its convex hull."""
+    shapes = [Polygon(mesh.vertices[list(face)]) for face in mesh.faces]
+    assume(all(shape.is_valid for shape in shapes))
+    lost = [shape.convex_hull.area - shape.area for shape in shapes]
+    assume(not any(1e-12 < area < 1e-7 for area in lost))  # nearly straight
+    assert n_concave(mesh) == sum(area >= 1e-7 for area in lost)
 
 
 def test_w_locality__has_to_be_a_weight() -> None:

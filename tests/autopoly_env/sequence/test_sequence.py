@@ -229,8 +229,8 @@ def test_from_json__refuses_a_text_cut_off_anywhere() -> None:
         ("[1, 2]", "the format is [1, 2], not 'autopoly-construction-sequence'"),
         ("{}", "the format is None"),
         ('{"format": "obj"}', "the format is 'obj'"),
-        ('{"format": "autopoly-construction-sequence"}', "the version is None; this release reads version 1"),
-        ('{"format": "autopoly-construction-sequence", "version": 2}', "the version is 2"),
+        ('{"format": "autopoly-construction-sequence"}', "the version is None; this release reads versions 1 and 2"),
+        ('{"format": "autopoly-construction-sequence", "version": 3}', "the version is 3"),
         ('{"format": "autopoly-construction-sequence", "version": 1}', "settings: Field required"),
     ],
 )
@@ -264,6 +264,7 @@ def test_from_json__refuses_what_is_no_finite_number(number: str) -> None:
         (lambda d: d["steps"][1]["score"].pop("iou"), "step 2: the score has no 'iou'"),
         (lambda d: d["steps"][1].update(operator=7), "step 2: operator: "),
         (lambda d: d["steps"][1].update(note="x"), "step 2: note: Unexpected"),
+        (lambda d: d["steps"][1].update(part=7), "step 2: part: "),
         (lambda d: d["steps"][1].update(operator="twist"), "operator 'twist' is unknown"),
         (lambda d: d["steps"][0].update(element={"edge": [0, 2]}), "no edge joins vertices 0 and 2"),
         (lambda d: d["steps"][0].update(element={"edge": [0, 9]}), "vertex id 9 is not in this mesh"),

@@ -19,9 +19,10 @@ from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import OPERATORS, Action
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import Silhouette
-from tests.helpers.constructions import TOTALS, house, score
+from tests.helpers.constructions import TOTALS, chapel, house, score
 from tests.helpers.drawings import HOUSE, painted
 from tests.helpers.player import HOSTILE, wanted
+from tests.helpers.tables import table
 
 
 class Reader(HTMLParser):
@@ -70,6 +71,19 @@ def test_page__tells_where_new_vertices_grow_from_and_lost_ones_go() -> None:
     along, way = np.array((0.15, 0.45)), np.array((0.125, 0.0))
     np.testing.assert_allclose(steps[5]["lost"]["5"], (0.75, 0.25) + along * (way @ along) / (along @ along), atol=1e-5)
     assert [step["moved"] for step in steps[1:4]] == [[4], [], [3, 6]]
+
+
+def test_page__names_parts_and_tells_what_steps_take_by_hand() -> None:
+    data = data_of(to_html(table()))
+    assert [step["part"] for step in data["steps"][1:]] == ["body", "body", "lower right, 1 of 2", "lower left, 2 of 2"]
+    assert [step["seconds"] for step in data["steps"][1:]] == [7.03, 7.03, 4.23, 4.23]
+    assert data["lesson"] == ["23 s by hand", "3 parts", "0 returns", "67 % quads", "1 n-gon"]
+    cut, leg = data["steps"][1]["keys"], data["steps"][3]["keys"]
+    assert cut[-1].startswith("`G`") and leg[-1] == "`E`: pull the new edge out, click"  # which puts it in its place
+
+
+def test_page__of_one_part_says_nothing_of_parts() -> None:
+    assert data_of(to_html(house(2)))["lesson"] == ["12 s by hand", "50 % quads"]
 
 
 def test_page__asks_for_nothing_from_outside() -> None:
@@ -137,8 +151,12 @@ def test_save__is_whole_or_not_there(tmp_path: Path) -> None:
 
 
 def test_words__name_elements_and_keys_of_every_operator() -> None:
-    words = {step.operator: describe_step(step, len(step.moved)) for step in house().steps}
+    steps = (*house().steps, *chapel().steps)
+    words = {step.operator: describe_step(step, len(step.moved)) for step in steps}
     assert words.keys() == OPERATORS.keys()
+    assert words["edge_fill"].done == "Edge 1–4 and edge 1–5 are joined by a new face, face 3. All vertices stay."
+    assert words["vertex_merge"].done == "Vertex 9 is merged into vertex 6. All vertices stay."
+    assert words["edge_fill"].keys[0].endswith("click edge 1–4, `Shift` click edge 1–5")
     assert (
         words["edge_subdivide"].done == "Edge 0–1 gets vertex 4 in its middle. Then 1 vertex moves to fit the target."
     )
@@ -146,6 +164,7 @@ def test_words__name_elements_and_keys_of_every_operator() -> None:
     assert words["edge_extrude"].keys[-1].startswith("`G`")
     assert words["face_delete"].done == "Face 3 is deleted. All vertices stay."
     keys = {"edge_subdivide": "Subdivide", "edge_extrude": "`E`", "face_split": "`J`", "face_delete": "`X` › Faces"}
+    keys |= {"edge_cap": "`M` › At Center", "edge_fill": "`F`", "vertex_merge": "`M` › At Last"}
     keys |= {"face_hole": "`K`", "vertex_dissolve": "`Ctrl` `X`", "edge_dissolve": "`X` › Dissolve Edges"}
     for operator, key in keys.items():
         assert key in " ".join(words[operator].keys)

@@ -9,6 +9,7 @@ from tests.helpers.browser import Page, needs_browser
 from tests.helpers.constructions import BEST, STEPS, TOTALS, house, score
 from tests.helpers.player import HOSTILE, LAST, Open, names, step_of, text, wanted
 from tests.helpers.strategies import random_walk
+from tests.helpers.tables import table
 
 # Time that stands still unless a test says otherwise.
 CLOCK = "window.clock = 0; performance.now = () => window.clock;"
@@ -97,6 +98,27 @@ def test_space_on_a_button__presses_that_button_only(play: Open) -> None:
     page.press(" ")
     assert step_of(page) == LAST - 1
     assert page.evaluate("document.getElementById('play').ariaLabel") == "Play"
+
+
+@needs_browser
+def test_parts__head_their_steps_in_the_list_and_stand_on_the_card(play: Open) -> None:
+    page = play(table())
+    heads = "[...document.querySelectorAll('#steps li')].map(item => item.querySelector('.part')?.textContent ?? '')"
+    assert page.evaluate(heads) == ["", "body", "", "lower right, 1 of 2", "lower left, 2 of 2"]
+    assert text(page, "#part") == "lower left, 2 of 2"
+    assert text(page, "#seconds") == ", about 4 s"
+    page.press("Home")
+    assert (text(page, "#part"), text(page, "#seconds")) == ("", "")
+    assert page.problems() == []
+
+
+@needs_browser
+def test_parts__are_not_spoken_of_where_there_is_one_and_are_text(play: Open) -> None:
+    assert play(house(2)).evaluate("document.querySelectorAll('.part').length") == 0
+    label = "<img src=x onerror='hacked = 1'>"
+    page = play(table().with_parts([None, None, label, label]))
+    assert text(page, "#part") == label
+    assert page.evaluate("typeof hacked") == "undefined" and page.problems() == []
 
 
 @needs_browser

@@ -1,0 +1,130 @@
+"""The operators of the preset `modeller`: known effects on known meshes, and every refusal."""
+
+import numpy as np
+import pytest
+
+from autopoly_env.mesh import PolyMesh, canonical_hash
+from autopoly_env.operators import OPERATORS
+from tests.helpers.operating import apply, edge, grid, legal, quad, refusal, two_quads
+
+
+def test_edge_cap__stands_half_as_high_as_its_edge_is_long() -> None:
+    mesh = apply("edge_cap", quad(), 0)
+    assert mesh.faces == ((0, 1, 2, 3), (1, 0, 4))
+    assert mesh.vertices[4].tolist() == [0.5, -0.5]
+    assert mesh.face_areas().tolist() == [1.0, 0.25]
+    assert "it lies between two faces; choose a boundary edge" in refusal("edge_cap", two_quads(), 3)
+    assert legal("edge_cap", two_quads()) == [0, 1, 2, 4, 5, 6]
+
+
+def test_edge_cap__keeps_clear_of_what_faces_it() -> None:
+    slot = [(0, 0), (1, 0), (1, 0.5), (0.6, 0.5), (0.6, 0.2), (0.4, 0.2), (0.4, 0.5), (0, 0.5)]
+    lid = [*slot, (0.45, 0.23), (0.55, 0.23), (0.5, 0.3)]  # an island whose lower side hangs 0.03 above the bottom
+    mesh = PolyMesh.from_faces(lid, [range(8), (8, 9, 10)])
+    made = apply("edge_cap", mesh, edge(mesh, 4, 5))  # 0.2 long: 0.1 and 0.05 meet the island, 0.025 does not
+    assert made.vertices[11] == pytest.approx((0.5, 0.225))
+
+
+def arms() -> PolyMesh:
+    """A bar 0-1-2-3 below, a quad up from either end of it: 4-5 and 6-7 face each other across the gap."""
+    corners = [(0, 1), (0.2, 0.8), (0.8, 0.8), (1, 1), (0, 0), (0.2, 0.2), (1, 0), (0.8, 0.2)]
+    return PolyMesh.from_faces(corners, [(1, 2, 3, 0), (1, 0, 4, 5), (3, 2, 7, 6)])
+
+
+def test_edge_fill__closes_a_ring_with_a_quad() -> None:
+    mesh = arms()
+    made = apply("edge_fill", mesh, edge(mesh, 4, 5), edge(mesh, 6, 7))
+    assert made.faces[-1] == (5, 4, 6, 7)
+    assert made.counts == (8, 12, 4)
+    assert (made.topology.n_components, made.topology.n_holes) == (1, 1)
+    assert canonical_hash(apply("edge_fill", mesh, edge(mesh, 6, 7), edge(mesh, 4, 5))) == canonical_hash(made)
+
+
+def test_edge_fill__uses_sides_that_are_there() -> None:
+    mesh = arms()
+    one = apply("edge_fill", mesh, edge(mesh, 1, 5), edge(mesh, 2, 7))  # over the bar, which is its third side
+    assert one.faces[-1] == (1, 5, 7, 2)
+    assert one.counts == (8, 11, 4)
+    hole = apply("face_delete", grid(), 4)
+    two = apply("edge_fill", hole, edge(hole, 5, 6), edge(hole, 9, 10))
+    assert two.counts == grid().counts
+    assert canonical_hash(two) == canonical_hash(grid())
+
+
+def test_edge_fill__makes_a_triangle_where_two_edges_share_a_corner() -> None:
+    mesh = apply("face_delete", PolyMesh.grid(2, 0, 0, 1, 1), 0)
+    corner = mesh.vertex_index(4)
+    first, second = (edge(mesh, corner, mesh.vertex_index(v)) for v in (1, 3))
+    made = apply("edge_fill", mesh, first)
+    assert {made.vertex_ids[v] for v in made.faces[-1]} == {1, 3, 4}
+    assert np.subtract(made.counts, mesh.counts).tolist() == [0, 1, 1]
+    assert made.face_areas()[-1] == 0.125
+    assert OPERATORS["edge_fill"].choose(mesh, first) == second
+
+
+def test_edge_fill__prefers_the_narrowest_gap() -> None:
+    left, near, far = (PolyMesh.rectangle(x, 0, x + 0.1, 0.5).vertices for x in (0.0, 0.2, 0.5))
+    mesh = PolyMesh.from_faces(np.vstack((left, near, far)), [(0, 1, 2, 3), (4, 5, 6, 7), (8, 9, 10, 11)])
+    assert OPERATORS["edge_fill"].choose(mesh, edge(mesh, 1, 2)) == edge(mesh, 4, 7)
+    assert OPERATORS["edge_fill"].choose(mesh, edge(mesh, 5, 6)) == edge(mesh, 8, 11)
+    assert legal("edge_fill", mesh) == sorted(edge(mesh, *e) for e in ((1, 2), (4, 7), (5, 6), (8, 11)))
+    apply("edge_fill", mesh, edge(mesh, 1, 2), edge(mesh, 8, 11))  # over the one between: asked for, so done
+
+
+def test_edge_fill__refuses_what_makes_no_mesh() -> None:
+    mesh = two_quads()
+    assert "it lies between two faces" in refusal("edge_fill", mesh, 3)
+    assert "no convex face joins it" in refusal("edge_fill", mesh, 0)
+    assert legal("edge_fill", mesh) == []
+    first = edge(mesh, 0, 1)
+    for other in (first, edge(mesh, 1, 4)):
+        assert "is not another boundary edge" in refusal("edge_fill", mesh, first, other)
+    for other in (-1, 7, "6"):
+        assert "is no edge" in refusal("edge_fill", mesh, first, other)
+    assert "has two faces already" in refusal("edge_fill", mesh, first, edge(mesh, 3, 4))  # 1-4 has
+    assert "no boundary would be left" in refusal("edge_fill", quad(), 0, edge(quad(), 2, 3))
+    pinched = PolyMesh.from_faces([(0, 0), (1, 0), (0, 1), (-1, 0), (0, -1)], [(0, 1, 2), (0, 3, 4)])
+    ways = [pinched.edge_index(0, v) for v in (1, 3)]  # both run from the pinch
+    assert "runs from or to the same vertex" in refusal("edge_fill", pinched, *ways)
+
+
+def bent() -> PolyMesh:
+    """Three quads around a missing one: 2 and 6 are the ends of the corner at 4."""
+    return apply("face_delete", PolyMesh.grid(2, 0.0, 0.0, 1.0, 1.0), 3)
+
+
+def test_vertex_merge__closes_a_corner_where_the_other_vertex_is() -> None:
+    mesh = bent()
+    assert mesh.vertex_ids == (0, 1, 2, 3, 4, 5, 6, 7)
+    made = apply("vertex_merge", mesh, 5, 7)
+    assert made.vertex_ids == (0, 1, 2, 3, 4, 6, 7)
+    assert made.counts == (7, 9, 3)
+    assert [[made.vertex_ids[v] for v in face] for face in made.faces] == [[0, 1, 4, 3], [1, 2, 7, 4], [3, 4, 7, 6]]
+    assert made.vertices[6].tolist() == mesh.vertices[7].tolist()
+    assert OPERATORS["vertex_merge"].choose(mesh, 5) == 7
+    assert OPERATORS["vertex_merge"].choose(mesh, 7) == 5
+    assert legal("vertex_merge", mesh) == [5, 7]
+
+
+def test_vertex_merge__closes_a_hole_of_four_corners_to_two_edges() -> None:
+    mesh = apply("face_delete", grid(), 4)
+    made = apply("vertex_merge", mesh, 5, 10)
+    assert np.subtract(made.counts, mesh.counts).tolist() == [-1, -2, 0]
+    assert (made.topology.n_holes, made.topology.is_boundary_vertex.sum()) == (0, 12)
+
+
+def test_vertex_merge__refuses_what_makes_no_mesh() -> None:
+    mesh = bent()
+    for other in (5, 4, 2):
+        assert "is a corner of the same face" in refusal("vertex_merge", mesh, 5, other)
+    assert "they would only touch" in refusal("vertex_merge", mesh, 0, 7)
+    assert "of more than two faces" in refusal("vertex_merge", grid(), 1, 9)
+    assert "no missing corner lies between" in refusal("vertex_merge", mesh, 0)
+    for other in (-1, 8, "6"):
+        assert "is no vertex" in refusal("vertex_merge", mesh, 5, other)
+
+
+def test_vertex_merge__leaves_some_boundary() -> None:
+    corners = [(0, 0), (1, 0), (1, 1), (0, 1), (0.3, 0.3), (0.7, 0.3), (0.7, 0.7), (0.3, 0.7)]
+    inset = PolyMesh.from_faces(corners, [(k, (k + 1) % 4, 4 + (k + 1) % 4, 4 + k) for k in range(4)] + [(4, 5, 6, 7)])
+    assert "no boundary would be left" in refusal("vertex_merge", inset, 0, 2)
