@@ -1,16 +1,34 @@
 """Polygon meshes: what they are, what follows from their faces, what may be wrong with them, how they are drawn."""
 
+from autopoly_env.mesh.face_rule import (
+    ASKED_TURN,
+    FACE_RULES,
+    LEAST_TURN,
+    FaceRule,
+    broken_faces,
+    check_faces,
+    face_rule,
+    fits_rule,
+)
 from autopoly_env.mesh.polymesh import PolyMesh, canonical_hash, is_valid, validate
 from autopoly_env.mesh.sanity import defects_of, is_sane
 from autopoly_env.mesh.symmetry import images_of, mirrored
 from autopoly_env.mesh.topology import Face, Topology
 
 __all__ = [
+    "ASKED_TURN",
+    "FACE_RULES",
+    "LEAST_TURN",
     "Face",
+    "FaceRule",
     "PolyMesh",
     "Topology",
+    "broken_faces",
     "canonical_hash",
+    "check_faces",
     "defects_of",
+    "face_rule",
+    "fits_rule",
     "images_of",
     "is_sane",
     "is_valid",

@@ -5,6 +5,7 @@ import numpy as np
 from autopoly_env.arrays import FloatArray
 from autopoly_env.compute import kernel
 from autopoly_env.raster.raster_kernels import Picture, Workspace
+from autopoly_env.refit.rule_kernels import hold
 from autopoly_env.refit.shape_kernels import HIGH, LOSS, LOW, N_EVALUATIONS, Progress, Shape, loss_at, obey, offer
 
 _FIRST_RATE, _LAST_RATE = 2.0 / 64.0, 0.1 / 64.0  # of the far phase, in unit-square lengths
@@ -44,5 +45,6 @@ def far_phase(
                 move = rate * mean[v, axis] / (1.0 - mean_left)
                 move /= np.sqrt(square[v, axis] / (1.0 - square_left)) + floor
                 unknowns[v, axis] = min(max(unknowns[v, axis] - move, low), high)
+        hold(shape.rule, unknowns, low, high)
         obey(shape.ties, shape.boundary, best, unknowns)
         rate *= decay

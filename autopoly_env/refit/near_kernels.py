@@ -6,6 +6,7 @@ from autopoly_env.arrays import FloatArray
 from autopoly_env.compute import kernel
 from autopoly_env.raster.derivative_kernels import normal_equations
 from autopoly_env.raster.raster_kernels import Picture, Workspace
+from autopoly_env.refit.rule_kernels import hinge, hold
 from autopoly_env.refit.shape_kernels import (
     HIGH,
     LOW,
@@ -59,6 +60,7 @@ def near_phase(
         for v in range(n):
             candidate[v, 0] = min(max(unknowns[v, 0] + scale * move[2 * v], low), high)
             candidate[v, 1] = min(max(unknowns[v, 1] + scale * move[2 * v + 1], low), high)
+        hold(shape.rule, candidate, low, high)
         obey(shape.ties, shape.boundary, best, candidate)
         next_loss = damped_equations(origin, candidate, shape, picture, stiffness, work, next_gradient, next_normal)
         if next_loss < loss:
@@ -86,7 +88,8 @@ def damped_equations(
     gradient: FloatArray, normal: FloatArray,
 ) -> float:  # fmt: skip
     """Sum of squared coverage errors plus `stiffness` times the squared changes (pixels) of the boundary edges since
-    `origin` (N, 2); its half gradient J'r (N, 2) and the lower triangle of J'J (2N, 2N), both per pixel."""
+    `origin` (N, 2), plus what breaks the rule of faces; its half gradient J'r (N, 2) and the lower triangle of J'J
+    (2N, 2N), both per pixel."""
     size = picture.coverage.shape[0]
     loss = normal_equations(unknowns, shape.loops, picture, work, gradient, normal)
     for e in range(shape.loops.shape[0] if stiffness != 0.0 else 0):
@@ -100,6 +103,7 @@ def damped_equations(
             normal[2 * i + axis, 2 * i + axis] += stiffness
             normal[2 * j + axis, 2 * j + axis] += stiffness
             normal[2 * max(i, j) + axis, 2 * min(i, j) + axis] -= stiffness
+    loss += hinge(shape.rule, origin, unknowns, size, gradient, normal)
     tie_gradient(shape.ties, gradient)
     tie_normal(shape.ties, normal)
     return loss

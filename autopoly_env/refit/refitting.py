@@ -7,6 +7,9 @@ target many pixels away without tangling it, which plain gradient descent (the o
 
 Vertices may be bound (`Bonds`): then fewer unknowns lead, and gradient and normal equations are reduced to those.
 
+Under a rule of faces (`autopoly_env.mesh.face_rule`) corners that turn too little cost as squared errors do, steps end
+where all corners turn, and a mesh is kept only if they do.
+
 Letters: V vertices, R pixels a side. The loss is the sum over pixels of (coverage - target)**2 at the finest level,
 each pixel times its weight where the target has weights.
 """
@@ -18,10 +21,11 @@ import numpy as np
 
 from autopoly_env.arrays import BoolArray, IntArray
 from autopoly_env.errors import MeshError
-from autopoly_env.mesh import PolyMesh, Topology
+from autopoly_env.mesh import ASKED_TURN, FaceRule, PolyMesh, Topology
 from autopoly_env.raster import picture_of, workspace
 from autopoly_env.raster.raster_kernels import Picture
 from autopoly_env.refit import refit_kernels
+from autopoly_env.refit.rule_kernels import FREE, LOCKED, Rule
 from autopoly_env.refit.shape_kernels import Settings, Shape, Ties
 from autopoly_env.silhouette import Silhouette, Target
 
@@ -95,18 +99,26 @@ class RefitResult:
 
 
 def refit(
-    mesh: PolyMesh, target: RefitTarget, config: RefitConfig = DEFAULT, bonds: Bonds | None = None
+    mesh: PolyMesh,
+    target: RefitTarget,
+    config: RefitConfig = DEFAULT,
+    bonds: Bonds | None = None,
+    faces: FaceRule = "any",
 ) -> RefitResult:
     """Move the vertices of `mesh` to match `target`, as far as `bonds` let them.
 
     The result is finite, its loss is at most that of `mesh`, and unless `config.keep_defects` it has no more
-    self-intersections and no more flipped faces. Vertices that would gain nothing stay bit for bit where they are;
-    vertices off the boundary follow their neighbours. Positions stay in the unit square, if they started there.
+    self-intersections and no more flipped faces; under a rule of faces no corner that turns too little is new, and none
+    turns less than before: what keeps the rule keeps it. Vertices that would gain nothing stay bit for bit where
+    they are; vertices off the boundary follow their neighbours. Positions stay in the unit square, if they started
+    there.
     Raises MeshError for vertices that are not finite.
     """
     if not np.isfinite(mesh.vertices).all():
         raise MeshError("the mesh to refit has vertices that are not finite: give finite positions")
-    shape = shape_of(mesh.topology) if bonds is None else _bound(shape_of(mesh.topology), bonds)
+    shape = shape_of(mesh.topology) if faces == "any" else _ruled(mesh.topology)
+    if bonds is not None:
+        shape = _bound(shape, bonds)
     moved = np.empty_like(mesh.vertices)
     before, after, n_evaluations = refit_kernels.refit(
         mesh.vertices,
@@ -144,7 +156,12 @@ def _bound(shape: Shape, bonds: Bonds) -> Shape:
     leader[bonds.locked[shape.boundary]] = -1
     free = [k for k, v in enumerate(shape.inner) if not bonds.locked[v]]
     parts = [shape.neighbours[shape.neighbour_offsets[k] : shape.neighbour_offsets[k + 1]] for k in free]
+    rule = shape.rule
+    if rule is not None:
+        partners = np.where(images < 0, FREE, numbers[images])
+        rule = rule._replace(images=np.where(bonds.locked[shape.boundary], LOCKED, partners))
     return shape._replace(
+        rule=rule,
         inner=shape.inner[free],
         neighbours=np.concatenate([*parts, np.empty(0, np.int64)]),
         neighbour_offsets=np.cumsum([0, *map(len, parts)]),
@@ -171,4 +188,37 @@ def shape_of(topology: Topology) -> Shape:
         inner=inner,
         neighbours=np.concatenate([*lists, np.empty(0, np.int64)]),
         neighbour_offsets=np.cumsum([0, *map(len, lists)]),
+    )
+
+
+@lru_cache(maxsize=4096)
+def rule_of(topology: Topology) -> Rule:
+    """What the kernels need of the corners of faces. Unknowns are numbered as in `_ruled`, first the boundary's."""
+    shape = shape_of(topology)
+    unknown = np.empty(topology.n_vertices, np.int64)
+    unknown[np.concatenate((shape.boundary, shape.inner))] = np.arange(topology.n_vertices)
+    at = unknown[topology.corners]
+    following = np.array(topology.links.following, np.int64)
+    triples = np.empty((len(at), 3), np.int64)
+    triples[following] = np.column_stack((at, at[following], at[following[following]]))
+    return Rule(
+        triples,
+        unknown[shape.inner],
+        unknown[shape.neighbours],
+        shape.neighbour_offsets,
+        np.full(len(unknown), FREE),
+        ASKED_TURN,
+    )
+
+
+@lru_cache(maxsize=4096)
+def _ruled(topology: Topology) -> Shape:
+    """`shape_of` with all vertices as unknowns and their corners bound to turn."""
+    shape, nothing = shape_of(topology), np.empty(0, np.int64)
+    return shape._replace(
+        boundary=np.concatenate((shape.boundary, shape.inner)),
+        inner=nothing,
+        neighbours=nothing,
+        neighbour_offsets=np.zeros(1, np.int64),
+        rule=rule_of(topology),
     )

@@ -1,7 +1,8 @@
 """What a refit knows of a mesh and its target, as arrays, and how unknowns become a mesh that is kept if it is sane.
 
 The unknowns are the N boundary vertices, numbered along the boundary loops so that the normal matrix is almost
-banded; the other vertices do not show in the picture and follow their neighbours. Letters: V vertices, N boundary
+banded; the other vertices do not show in the picture and follow their neighbours. Under a rule of faces all V vertices
+are unknowns, those of the boundary first (N = V, `rule_kernels`). Letters: V vertices, N boundary
 vertices, B directed boundary edges, E edges, F faces, R pixels a side. Positions are in the unit square.
 """
 
@@ -11,9 +12,11 @@ import numpy as np
 
 from autopoly_env.arrays import BoolArray, FloatArray, IntArray
 from autopoly_env.compute import kernel
+from autopoly_env.mesh.corner_kernels import keeps_turns
 from autopoly_env.mesh.geometry_kernels import defects
 from autopoly_env.raster.derivative_kernels import half_gradient
 from autopoly_env.raster.raster_kernels import Picture, Workspace
+from autopoly_env.refit.rule_kernels import Rule
 
 
 class Ties(NamedTuple):
@@ -36,6 +39,7 @@ class Shape(NamedTuple):
     neighbours: IntArray  # vertices joined to each inner vertex, one after the other
     neighbour_offsets: IntArray  # (K+1,)
     ties: Ties | None = None  # None where all unknowns are free: Numba then compiles a refit that knows of no ties
+    rule: Rule | None = None  # None where faces may have any corners: likewise
 
 
 class Settings(NamedTuple):
@@ -156,10 +160,24 @@ def offer(unknowns: FloatArray, shape: Shape, loss: float, best: Progress) -> bo
     spread(unknowns, shape, best)
     crossings, flipped = defects(best.trial, shape.edges, shape.corners, shape.offsets)
     sane = crossings <= best.record[MOST_CROSSINGS] and flipped <= best.record[MOST_FLIPPED]
+    sane = sane and keeps_rule(shape, best.trial, best.start)
     if sane and loss < best.record[LOSS]:
         best.record[LOSS] = loss
         best.points[:] = best.trial
     return sane
+
+
+@kernel
+def keeps_rule(shape: Shape, points: FloatArray, start: FloatArray) -> bool:
+    """Whether every corner turns as it should, or by no less than it did at the start."""
+    return _keeps(shape.rule, shape, points, start)
+
+
+@kernel
+def _keeps(rule: Rule | None, shape: Shape, points: FloatArray, start: FloatArray) -> bool:
+    if rule is None:
+        return True
+    return keeps_turns(points, start, shape.corners, shape.offsets, rule.asked)
 
 
 @kernel

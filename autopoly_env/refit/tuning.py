@@ -2,18 +2,18 @@
 
 import numpy as np
 
-from autopoly_env.mesh import PolyMesh
+from autopoly_env.mesh import FaceRule, PolyMesh
 from autopoly_env.raster import pixels_of, workspace
-from autopoly_env.refit.refitting import Bonds, shape_of
+from autopoly_env.refit.refitting import Bonds, rule_of, shape_of
 from autopoly_env.refit.tuning_kernels import tune as tune_in_place
 from autopoly_env.silhouette import Target
 
 
-def tune(mesh: PolyMesh, target: Target, bonds: Bonds | None = None) -> PolyMesh:
+def tune(mesh: PolyMesh, target: Target, bonds: Bonds | None = None, faces: FaceRule = "any") -> PolyMesh:
     """The mesh with boundary vertices moved by pattern search (Hooke and Jeeves 1961), steps of 2 to 1/4 pixel.
 
-    Its IoU with the target is as large or larger; there are no new crossings or flipped faces, vertices in the unit
-    square stay in it, and `bonds` hold.
+    Its IoU with the target is as large or larger; there are no new crossings, flipped faces or faces that break the
+    rule `faces`, vertices in the unit square stay in it, and `bonds` hold.
     """
     points = mesh.vertices.copy()
     images = np.full(len(points), -1, np.int64)
@@ -23,7 +23,7 @@ def tune(mesh: PolyMesh, target: Target, bonds: Bonds | None = None) -> PolyMesh
     tune_in_place(
         points,
         edges,
-        shape_of(mesh.topology),
+        shape_of(mesh.topology)._replace(rule=None if faces == "any" else rule_of(mesh.topology)),
         images,
         0.5 if bonds is None else bonds.axis,
         pixels_of(target),

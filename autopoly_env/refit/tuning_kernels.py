@@ -10,7 +10,7 @@ from autopoly_env.arrays import FloatArray, IntArray
 from autopoly_env.compute import kernel
 from autopoly_env.mesh.geometry_kernels import defects
 from autopoly_env.raster.raster_kernels import Pixels, Workspace, overlap_counts_in_rows
-from autopoly_env.refit.shape_kernels import Shape
+from autopoly_env.refit.shape_kernels import Shape, keeps_rule
 
 _STEPS = (2.0, 1.0, 0.5, 0.25)  # pixels
 _N_DIRECTIONS = 8
@@ -44,13 +44,14 @@ def tune(
     """Move `points` (V, 2), in place, by pattern search on the IoU.
 
     `edges` (B, 2) are the boundary's. `images` (V,) holds each vertex's mirror image about x = `axis`, -1 for a vertex
-    that has none, -2 for one that stays; `n_filled` is what the target's pixels weigh together. No crossing and no
-    flipped face comes about, and nothing leaves the picture. A vertex changes the rows only that its edges cross, so
-    those are all that is counted again.
+    that has none, -2 for one that stays; `n_filled` is what the target's pixels weigh together. No crossing, no flipped
+    face and no corner against the rule of faces comes about, and nothing leaves the picture. A vertex changes the rows
+    only that its edges cross, so those are all that is counted again.
     """
     size = pixels.mask.shape[0]
     inside, filled = overlap_counts_in_rows(points, edges, pixels, work, 0, size)
     crossings, flipped = defects(points, shape.edges, shape.corners, shape.offsets)
+    start = points.copy()
     for step in _STEPS:
         for _round in range(_N_ROUNDS):
             n_moved = 0
@@ -77,7 +78,8 @@ def tune(
                     iou = _iou(inside + gain_inside, filled + gain_filled, n_filled)
                     if iou > _iou(inside, filled, n_filled) + _LEAST_GAIN:
                         now_crossings, now_flipped = defects(points, shape.edges, shape.corners, shape.offsets)
-                        if now_crossings <= crossings and now_flipped <= flipped:
+                        sane = now_crossings <= crossings and now_flipped <= flipped
+                        if sane and keeps_rule(shape, points, start):
                             inside, filled = inside + gain_inside, filled + gain_filled
                             n_moved += 1
                             first, last = _rows_around(v, image, points, edges, step / size, size)
