@@ -19,7 +19,7 @@ LEAST_MOVE = 0.01  # of the image's side: a vertex that moves less is said to st
 class Lesson:
     """How a sequence of n steps, and so n + 1 meshes, reads."""
 
-    valid: float  # 0 to 1, share of the meshes without crossings and without flipped or empty faces: 1 is expected
+    valid: float  # 0 to 1, share of the meshes without crossings and flipped, empty or forbidden faces: 1 is expected
     blocking_in: float  # 0 to 1, area under the curve of r_sm over the steps: high where the big shape comes first
     moved: float  # 0 to 1, mean share of the vertices already there that a step moves: LOW is good, 0 is local
     n_actions: int  # n
@@ -41,7 +41,7 @@ class Lesson:
         meshes = sequence.meshes()
         ious = [float(score["iou"]) for score in (sequence.start_score, *(step.score for step in sequence.steps))]
         shares = [share_moved(before, after) for before, after in pairwise(meshes)]
-        n_valid = sum(is_sane(mesh) for mesh in meshes)
+        n_valid = sum(is_sane(mesh, sequence.faces) for mesh in meshes)
         return cls(n_valid / len(meshes), _area_below(ious), float(np.mean(shares)) if shares else 0.0, len(shares))
 
 
