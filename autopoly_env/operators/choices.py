@@ -107,7 +107,7 @@ def _slide(mesh: PolyMesh, edge: int, ids: ChoiceIds) -> Choice:
             if end in ends:
                 return slide if end == ends[0] else 1.0 - slide
     raise SequenceError(
-        f"choice {_short(ids)}: expected an end of the edge and how far from it, {{'from': id, 'slide': 0.5}}"
+        f"choice {shortened(ids)}: expected an end of the edge and how far from it, {{'from': id, 'slide': 0.5}}"
     )
 
 

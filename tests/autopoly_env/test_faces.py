@@ -155,7 +155,7 @@ def test_a_step_that_breaks_the_rule__is_named() -> None:
 
 @pytest.mark.parametrize("start", [DART, sequence_of(DART)], ids=["mesh", "sequence"])
 def test_starts_that_break_the_rule__are_refused(start: PolyMesh | ConstructionSequence) -> None:
-    with pytest.raises(ConfigError, match="face 0 of .* has a reflex corner at vertex 1; faces=quads"):
+    with pytest.raises(ConfigError, match=r"face 0 of .* has a reflex corner at vertex 1; faces=quads"):
         Simulator(painted(BOTTLE), faces="quads", start=start)
     with pytest.raises(ConfigError, match="face 0 of the mesh has a reflex corner"):
         Simulator(painted(BOTTLE), faces="quads").initial(DART)
