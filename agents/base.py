@@ -29,6 +29,7 @@ class Agent(ABC):
     config_class: ClassVar[type[Any] | None] = None  # a dataclass, all with defaults, that __init__ takes one of
     runs_simulations = False  # what a budget may limit
     takes_guidance = True  # a start mesh, locked vertices and symmetry, which the transitions it plays keep to
+    takes_faces = True  # a rule of faces, which these transitions keep as well
 
     @abstractmethod
     def act(self, simulator: Simulator, state: State) -> Decision:
@@ -73,9 +74,10 @@ class Agent(ABC):
 
 
 class WholeAgent(Agent):
-    """Finds its shape as a whole instead of playing step by step, and so without guidance."""
+    """Finds its shape as a whole instead of playing step by step, and so without guidance and rules of faces."""
 
     takes_guidance = False
+    takes_faces = False
 
     def act(self, simulator: Simulator, state: State) -> Decision:
         """Always STOP: only `solve` finds shapes."""
@@ -87,8 +89,9 @@ class WholeAgent(Agent):
         budget: Budget | None = None,
         on_progress: Callable[[Progress], None] | None = None,
     ) -> Solution:
-        """As every agent. Raises ConfigError where the simulator has guidance that it cannot take."""
+        """As every agent. Raises ConfigError where it cannot take the simulator's guidance or rule of faces."""
         check_guidance(self, simulator.guidance.names)
+        check_faces(self, simulator)
         return self._find(simulator, Meter(budget or Budget(), on_progress))
 
     @abstractmethod
@@ -107,4 +110,13 @@ def check_guidance(agent: Agent, names: Sequence[str]) -> None:
         raise ConfigError(
             f"{agent.name} finds outlines as a whole and cannot heed {names[0]!r}: choose an agent that plays step by "
             "step, such as mcts, beam or greedy (docs/guidance.md)"
+        )
+
+
+def check_faces(agent: Agent, simulator: Simulator) -> None:
+    """Raise ConfigError if an agent cannot keep the simulator's rule of faces."""
+    if simulator.faces != "any" and not agent.takes_faces:
+        raise ConfigError(
+            f"{agent.name} finds outlines, whatever their faces, and cannot keep faces={simulator.faces}: choose an "
+            "agent that plays step by step, such as mcts, beam or greedy, or faces=any"
         )

@@ -17,7 +17,7 @@ from agents.budget import Budget, Progress
 from agents.contract import solved
 from agents.solution import Solution
 from autopoly_env.errors import AutoPolyError, ConfigError, ConformanceError, IllegalActionError
-from autopoly_env.mesh import PolyMesh, images_of
+from autopoly_env.mesh import PolyMesh, broken_faces, images_of
 from autopoly_env.operators import Action
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import Silhouette
@@ -40,7 +40,7 @@ def check_agent(
     sequence, whatever was solved in between. Progress is reported, and never goes back; a budget is overrun by one step
     of work at most, which may make `reports_a_step`; a KeyboardInterrupt in a report ends the search with a Solution.
     `act` decides for legal actions. An agent that `takes_guidance` leaves locked vertices where they are and keeps
-    symmetry; another raises ConfigError.
+    symmetry; another raises ConfigError. Every mesh of one that `takes_faces` keeps the rule; another raises, too.
 
     Returns None, or raises ConformanceError naming the rule that was broken.
     """
@@ -62,6 +62,7 @@ def check_agent(
     _check_progress_and_budgets(agent, games[-1], reports_a_step)
     _check_interrupts(agent, games[-1])
     _check_guidance(agent, shapes[-1], settings)
+    _check_faces(agent, shapes[-1], settings)
 
 
 def check_solution(solution: Solution, simulator: Simulator) -> None:
@@ -84,6 +85,8 @@ def check_solution(solution: Solution, simulator: Simulator) -> None:
     _require(n_new <= most, f"{n_new} steps: max_steps = {simulator.max_steps} is not kept")
     others = {step.operator for step in sequence.steps} - set(simulator.operators)
     _require(not others, f"the sequence uses {', '.join(others)}, which the simulator does not have")
+    for number, mesh in enumerate(meshes):
+        _require(not broken_faces(mesh, simulator.faces), f"step {number}: the mesh breaks faces={simulator.faces}")
     told = {**simulator.settings(), "scored_at": simulator.silhouette.resolution}
     kept = {name: sequence.settings.get(name) for name in told} == told
     _require(kept, "the sequence's settings lack the simulator's `settings()` or `scored_at`")
@@ -191,6 +194,15 @@ def _check_guidance(agent: Agent, silhouette: Silhouette, settings: dict[str, An
                 _require(held == _START.vertices[list(wish["locked"])].tolist(), where)
         if "symmetry" in wish:
             _require(images_of(solution.mesh, 0.5) is not None, "the mesh is not symmetric about the axis asked for")
+
+
+def _check_faces(agent: Agent, silhouette: Silhouette, settings: dict[str, Any]) -> None:
+    simulator = Simulator(silhouette, **{**settings, "faces": "quads"})
+    if agent.takes_faces:
+        check_solution(solved(agent, simulator, Budget(refits=60)), simulator)
+    else:
+        what = "it keeps no rule of faces, yet does not refuse faces=quads with a ConfigError"
+        _require(_refuses(agent, simulator), what)
 
 
 def _refuses(agent: Agent, simulator: Simulator) -> bool:

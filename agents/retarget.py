@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from agents.commands.operators import OutsideOperators, know
+from agents.commands.operators import FaceRuleOfSequence, OutsideOperators, know
 from agents.commands.running import INTERRUPTED, run_command
 from autopoly_env.errors import ConfigError, SequenceError
 
@@ -49,6 +49,7 @@ def retarget(
     refits: Annotated[int, typer.Option(help="Limit of refits.")] = 300,
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out"),
     operators: OutsideOperators = None,
+    faces: FaceRuleOfSequence = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print a JSON record, no table.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar, no notes.")] = False,
 ) -> int:
@@ -64,7 +65,7 @@ def retarget(
 
     budget = Budget(refits=refits)
     know(operators)
-    sequence = ConstructionSequence.load(source)
+    sequence = _under(source, ConstructionSequence.load(source), faces)
     [job] = name_jobs([image], out)
     silhouette = load_silhouette(image, name=job.name)
     simulator = _simulator(source, sequence, silhouette)
@@ -94,6 +95,14 @@ def main(arguments: list[str] | None = None) -> int:
     return run_command(app, arguments, "python -m agents.retarget", stopped=STOPPED)
 
 
+def _under(source: Path, sequence: "ConstructionSequence", faces: str | None) -> "ConstructionSequence":
+    """The sequence under a rule of faces. Raises SequenceError, with its file, where it breaks that."""
+    try:
+        return sequence.under(faces)
+    except SequenceError as error:
+        raise SequenceError(f"{source}: {error}") from None
+
+
 def _simulator(source: Path, sequence: "ConstructionSequence", silhouette: "Silhouette") -> "Simulator":
     """The rules that the sequence was made under, as far as it tells them. Raises SequenceError for unknown ones."""
     from autopoly_env.sequence.variation import weights_of
@@ -107,6 +116,7 @@ def _simulator(source: Path, sequence: "ConstructionSequence", silhouette: "Silh
             resolution=resolution if isinstance(resolution, int) else 128,
             weights=weights_of(sequence.settings),
             max_steps=max(100, len(sequence.steps)),
+            faces=sequence.faces,
         )
     except ConfigError as error:
         raise SequenceError(f"{source}: settings: {error}") from None

@@ -23,6 +23,7 @@ Examples:
   python -m agents.solve chair.png --agent beam --option width=4 --refits 5000
   python -m agents.solve chair.png --agent my.module:MyAgent
   python -m agents.solve 'shapes/**/*.png' --json --quiet > scores.jsonl
+  python -m agents.solve mug.png --agent beam --faces quads
   python -m agents.solve mug.png --importance face.png
   python -m agents.solve mug.png --agent beam --start mug.obj --lock 0,3
   python -m agents.solve vase.png --agent beam --symmetry auto
@@ -37,7 +38,8 @@ and OUT/overview.png shows all meshes, if there are several images.
 \b
 Guidance (docs/guidance.md): --importance is for every agent; --start, --lock
 and --symmetry are for those that play step by step: all but trace, climb,
-decimate, dr-simple and dr-complex.
+decimate, dr-simple and dr-complex. --faces convex or quads is for all but
+trace, climb and decimate.
 
 \b
 Printed are the scores, at each image's own resolution, and the picture to open:
@@ -72,6 +74,7 @@ def solve(
     operators: Annotated[
         str, typer.Option(help="paper, full, names, or my.module:my_operator, separated by commas.")
     ] = "full",
+    faces: Annotated[str, typer.Option(help="Rule of faces: any, convex, or quads (convex, 3 or 4 corners).")] = "any",
     w_sm: Annotated[float, typer.Option(help="Weight of the IoU.")] = 100.0,
     w_sc: Annotated[float, typer.Option(help="Weight of the complexity V + E + F.")] = 0.3,
     w_si: Annotated[float, typer.Option(help="Weight of the self-intersections.")] = 5.0,
@@ -132,7 +135,7 @@ def solve(
     budget = Budget(refits, seconds, simulations)
     wishes = read_wishes(importance, start, lock, symmetry)
     options = _parse_options(option or [])
-    settings = Settings(agent, options, seed, operators, resolution, max_steps, weights, budget, wishes)
+    settings = Settings(agent, options, seed, operators, resolution, max_steps, weights, budget, wishes, faces)
     settings.check()
     found, problems = _find(images)
     jobs = name_jobs(found, out)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from agents.commands.operators import OutsideOperators, know
+from agents.commands.operators import FaceRuleOfSequence, OutsideOperators, know
 from agents.commands.running import INTERRUPTED, run_command
 from autopoly_env.errors import ConfigError, SequenceError
 
@@ -49,6 +49,7 @@ def vary(
     seed: Annotated[int, typer.Option(help="Of the random numbers.")] = 0,
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/variants"),
     operators: OutsideOperators = None,
+    faces: FaceRuleOfSequence = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar, no notes.")] = False,
 ) -> int:
     """Check the options, then draw and write one variant after the other; return the exit code."""
@@ -62,6 +63,7 @@ def vary(
     know(operators)
     sequence = ConstructionSequence.load(source)
     try:
+        sequence = sequence.under(faces)
         check_sound(sequence)
     except SequenceError as error:
         raise SequenceError(f"{source}: {error}") from None

@@ -18,7 +18,7 @@ import numpy as np
 from autopoly_env.errors import AutoPolyError, ConfigError, ConformanceError, IllegalActionError, OutputError
 from autopoly_env.export.formats import Export, Format
 from autopoly_env.export.player import describe_step
-from autopoly_env.mesh import PolyMesh, images_of, is_valid
+from autopoly_env.mesh import PolyMesh, broken_faces, images_of, is_valid
 from autopoly_env.operators import OPERATORS, STOP, Action, Operator, Start
 from autopoly_env.operators.operator import Mirroring
 from autopoly_env.raster import coverage
@@ -60,7 +60,8 @@ def check_simulator(simulator: Simulator, n_steps: int = 30, seed: int = 0) -> N
 
     Rules: STOP is legal until the end, nothing after it; every action it calls legal works, another raises
     IllegalActionError; the same state and action give the same state, alone and in `transition_all`; a transition
-    leaves the state it starts from as it was; scores are those of the meshes; states pickle; `max_steps` is kept.
+    leaves the state it starts from as it was; scores are those of the meshes; states pickle; `max_steps` is kept, and
+    so is the rule of faces.
     """
     rng = np.random.default_rng(seed)
     state = simulator.initial()
@@ -298,6 +299,7 @@ def _checked_transition(simulator: Simulator, state: State, action: Any, where: 
     _require(after.score == simulator.score(after.mesh, state.mesh), f"{where}: the score is not that of the mesh")
     _require(after.step == state.step + 1, f"{where}: the step is not counted")
     _require(is_valid(after.mesh), f"{where} gives a mesh that is not valid")
+    _require(not broken_faces(after.mesh, simulator.faces), f"{where} breaks the rule of faces")
     _require(bool(after.done) or after.step < simulator.max_steps, f"{where}: max_steps is not kept")
     return after
 

@@ -12,7 +12,7 @@ from autopoly_env.arguments import number, one_of, whole
 from autopoly_env.arrays import BoolArray
 from autopoly_env.compute import Routine, run
 from autopoly_env.errors import ConfigError, EpisodeError, IllegalActionError
-from autopoly_env.mesh import PolyMesh, validate
+from autopoly_env.mesh import FACE_RULES, PolyMesh, validate
 from autopoly_env.observation import Observation, Observer
 from autopoly_env.operators import Action, ActionCodec, describe
 from autopoly_env.score import ScoreWeights
@@ -89,6 +89,7 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
     - `targets`: "construction", "objects", a folder of images, or a `TargetSource`; `split`: "train" or "test".
     - `operators`: a preset ("paper", "full") or names with commas between them.
     - `resolution`: pixels a side at which meshes are fitted and scored; `obs_resolution`: of the observed pictures.
+    - `faces`: the rule of faces that every mesh keeps: "any", "convex", "quads" (convex, 3 or 4 corners).
     - `max_steps`, `max_vertices`, `match_threshold`: see above.
     - `reward_mode`, `illegal_penalty`, `w_sm`, `w_sc`, `w_si`: see above.
     - `render_mode`: None, "rgb_array" or "ansi"; "human" through `gymnasium.make`. `render_size`: pixels.
@@ -123,6 +124,7 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
         max_steps: int = 20,
         max_vertices: int = 32,
         match_threshold: float = 0.99,
+        faces: str = "any",
         reward_mode: str = "score",
         illegal_penalty: float = 1.0,
         w_sm: float = 100.0,
@@ -140,6 +142,7 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
             "weights": ScoreWeights(number("w_sm", w_sm), number("w_sc", w_sc), number("w_si", w_si)),
             "max_steps": whole("max_steps", max_steps, at_least=1),
             "match_threshold": number("match_threshold", match_threshold),
+            "faces": one_of("faces", faces, FACE_RULES),
         }
         example = self._simulator_of(_ANY_SHAPE)
         self.codec = ActionCodec(example.operators, whole("max_vertices", max_vertices, at_least=4))
@@ -302,6 +305,8 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
     def _legal_mask(self) -> BoolArray:
         if self._mask is None:
             self._mask = self.codec.legal_mask(self.state.mesh)
+            if self._simulator.faces != "any":
+                self._mask &= self.codec.mask_of(self._simulator.legal_actions(self.state))
         return self._mask
 
     def _observation(self) -> Observation:

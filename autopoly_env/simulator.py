@@ -14,12 +14,12 @@ import shapely
 
 from autopoly_env.arrays import BoolArray
 from autopoly_env.compute import Job, Routine, map_threads, run
-from autopoly_env.errors import ConfigError, IllegalActionError
+from autopoly_env.errors import ConfigError, IllegalActionError, MeshError
 from autopoly_env.guidance import Guidance, ImportanceSource, importance_settings, weighted
-from autopoly_env.mesh import PolyMesh, defects_of
-from autopoly_env.operators import STOP, Action, Choice, Halfway, Operator, legal_actions, preset
+from autopoly_env.mesh import FaceRule, PolyMesh, broken_faces, check_faces, defects_of, face_rule
+from autopoly_env.operators import STOP, Action, Choice, Halfway, Operator, Start, describe, legal_actions, preset
 from autopoly_env.placement import Disagreement, Trial, tried
-from autopoly_env.refit import FROM_AFAR, LOCAL, THOROUGH, RefitConfig, RefitTarget, holding, refit, tune
+from autopoly_env.refit import FROM_AFAR, LOCAL, THOROUGH, RefitConfig, RefitTarget, holding, mended, refit, tune
 from autopoly_env.score import Score, ScoreWeights, score
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence.lesson import share_moved
@@ -54,6 +54,7 @@ class Simulator:
     Parameters: `silhouette`, the target; `operators`, presets or names ("paper", "full,my.module:my_operator",
     "edge_subdivide,..."), or a list of names and Operators; the `resolution` R at which states are refitted and scored,
     in pixels; `weights` of the score; the game ends at `max_steps` and where the IoU reaches `match_threshold`.
+    `faces` is the rule of faces that every mesh keeps: "any", "convex", or "quads", convex ones of 3 and 4 corners.
 
     A user may guide the construction (docs/guidance.md): `importance`, an image that says where matching matters;
     `start`, the mesh to begin with, or a sequence to go on from; `locked`, ids of its vertices that are neither moved
@@ -71,6 +72,7 @@ class Simulator:
         weights: ScoreWeights | None = None,
         max_steps: int = 100,
         match_threshold: float = 1.0,
+        faces: FaceRule = "any",
         importance: ImportanceSource | None = None,
         start: PolyMesh | ConstructionSequence | None = None,
         locked: Collection[int] = (),
@@ -82,8 +84,10 @@ class Simulator:
             raise ConfigError(f"max_steps {max_steps}: expected at least 0")
         if not 0.0 < match_threshold <= 1.0:
             raise ConfigError(f"match_threshold {match_threshold}: expected an IoU above 0, at most 1")
+        self.faces = face_rule(faces)
         self.silhouette = silhouette if importance is None else weighted(silhouette, importance)
         self.guidance = Guidance.of(self.silhouette, start, locked, symmetry)
+        self._check_start()
         self.operators = tuple(operator.name for operator in preset(operators))
         self.resolution = resolution
         self.weights = weights or ScoreWeights()
@@ -121,6 +125,7 @@ class Simulator:
             "max_steps": self.max_steps,
             "match_threshold": self.match_threshold,
             **asdict(self.weights),
+            **({} if self.faces == "any" else {"faces": self.faces}),
             **importance_settings(self.silhouette),
             **self.guidance.settings(),
         }
@@ -129,7 +134,8 @@ class Simulator:
         """The state before the first action: `mesh` or the start mesh as it is, or the better of two refitted boxes.
 
         These are the upright and the smallest bounding box of the target; under symmetry there is one, upright and
-        centred on the axis. Raises ConfigError for a mesh that is not symmetric where it has to be.
+        centred on the axis. Raises ConfigError for a mesh that is not symmetric where it has to be, or against the rule
+        of faces.
         """
         return run(self.initial_routine(mesh))
 
@@ -138,6 +144,7 @@ class Simulator:
         mesh = self.guidance.start if mesh is None else mesh
         if mesh is not None:
             self.guidance.check_symmetric(mesh)
+            self._check_faces(mesh, "the mesh")
             return self._ended(State(mesh, self.score(mesh), n_refits=0))
         fits = yield [self._refit_job(box, FROM_AFAR, 1.0) for box in self._bounding_boxes()]
         best = max((fit.mesh for fit in fits), key=lambda fit: self.score(fit).total)
@@ -166,6 +173,30 @@ class Simulator:
                 corners = corners[::-1]
             yield PolyMesh.from_faces(corners, [(0, 1, 2, 3)])
 
+    def defects_of(self, mesh: PolyMesh) -> tuple[int, int]:
+        """(crossings, faces that are flipped, empty or against the simulator's rule) of a mesh."""
+        return defects_of(mesh, self.faces)
+
+    def is_sane(self, mesh: PolyMesh) -> bool:
+        """Whether no edges cross and no face is flipped, empty or against the simulator's rule."""
+        return self.defects_of(mesh) == (0, 0)
+
+    def _check_start(self) -> None:
+        """Raise ConfigError if the start, or a mesh of the sequence to go on from, breaks the rule of faces."""
+        if self.faces == "any":
+            return
+        earlier = self.guidance.earlier
+        for number, mesh in enumerate([] if earlier is None else earlier.meshes()):
+            self._check_faces(mesh, f"mesh {number} of the sequence to go on from")
+        if self.guidance.start is not None:
+            self._check_faces(self.guidance.start, "the start mesh")
+
+    def _check_faces(self, mesh: PolyMesh, what: str) -> None:
+        try:
+            check_faces(mesh, self.faces, what)
+        except MeshError as error:
+            raise ConfigError(str(error)) from None
+
     def score(self, mesh: PolyMesh, before: PolyMesh | None = None) -> Score:
         """What a mesh is worth at the simulator's resolution; as the result of a step from `before`, if that is given.
 
@@ -189,7 +220,7 @@ class Simulator:
         if state.done:
             return []
         actions = [a for a in legal_actions(state.mesh, self.operators) if self.guidance.allows(state.mesh, a)]
-        if self.guidance.axis is not None:  # only trying tells whether there is room for a mirror image
+        if self.guidance.axis is not None or self.faces != "any":  # only trying tells whether there is room for it
             disagreement = Disagreement(state.mesh, self.silhouette)
             actions = [trial.action for trial in self._possible(disagreement, actions)]
         return [STOP, *actions]
@@ -205,7 +236,7 @@ class Simulator:
         if action == STOP:
             return replace(state, done="stop", action=STOP, choice=None, n_refits=0, halfway=None)
         self._check_operator(action)
-        trial = self._tried(Disagreement(state.mesh, self.silhouette), action)
+        trial = self.trial_of(Disagreement(state.mesh, self.silhouette), action)
         return (yield from self._refitted(state, trial))
 
     def idle(self, state: State) -> State:
@@ -232,17 +263,43 @@ class Simulator:
         if action.operator not in self.operators:
             raise IllegalActionError(f"{action.operator!r} is not one of this simulator's operators: {self.operators}")
 
-    def _tried(self, disagreement: Disagreement, action: Action) -> Trial:
-        """The action, not refitted yet. Raises IllegalActionError where it is not legal."""
+    def trial_of(self, disagreement: Disagreement, action: Action) -> Trial:
+        """An action on the mesh of `disagreement`, not refitted yet. Raises IllegalActionError where it is illegal."""
         trial = tried(disagreement, action, self.guidance.axis)
         self.guidance.check_locks(disagreement.mesh, action, trial.starts[0].mesh)
-        return trial
+        return trial if self.faces == "any" else self._ruled(disagreement, trial)
+
+    def _ruled(self, disagreement: Disagreement, trial: Trial) -> Trial:
+        """The trial with the starts that keep the rule of faces, or else those that can be mended.
+
+        Raises IllegalActionError where there are none.
+        """
+        kept = [start for start in trial.starts if self._keeps_rule(start)]
+        if not kept and trial.shows:
+            mended = [self._mended(start, disagreement.defects) for start in trial.starts]
+            kept = [start for start in mended if start is not None]
+        if not kept:
+            what = describe(disagreement.mesh, trial.action)
+            raise IllegalActionError(f"{what} leaves a face that faces={self.faces} does not allow; choose another")
+        return replace(trial, starts=kept)
+
+    def _keeps_rule(self, start: Start) -> bool:
+        meshes = [start.mesh] if start.halfway is None else [start.halfway.mesh, start.mesh]
+        return not any(broken_faces(mesh, self.faces) for mesh in meshes)
+
+    def _mended(self, start: Start, defects: tuple[int, int]) -> Start | None:
+        """The start with its vertices moved as the rule of faces wants them; None where that is not to be had."""
+        mesh = mended(start.mesh, self.faces, self.guidance.bonds(start.mesh))
+        if mesh is None or any(now > then for now, then in zip(defects_of(mesh), defects, strict=True)):
+            return None
+        moved = start._replace(mesh=mesh)
+        return moved if self._keeps_rule(moved) else None
 
     def _possible(self, disagreement: Disagreement, actions: Sequence[Action]) -> Iterator[Trial]:
         """The actions that are legal after all."""
         for action in actions:
             try:
-                yield self._tried(disagreement, action)
+                yield self.trial_of(disagreement, action)
             except IllegalActionError:
                 continue
 
@@ -253,11 +310,11 @@ class Simulator:
             n_refits = 0
         else:
             fits = yield [self._refit_job(start.mesh, THOROUGH, state.score.iou) for start in trial.starts]
-            k = min(range(len(fits)), key=lambda k: (sum(defects_of(fits[k].mesh)), fits[k].loss))
+            k = min(range(len(fits)), key=lambda k: (sum(self.defects_of(fits[k].mesh)), fits[k].loss))
             (choice, begun, halfway), mesh, n_refits = trial.starts[k], fits[k].mesh, len(fits)
             if self.docked(state.mesh, mesh) > 0.0:
                 held = yield from self._held(state, begun)
-                mesh = max((mesh, *held), key=lambda m: (-sum(defects_of(m)), self.score(m, state.mesh).total))
+                mesh = max((mesh, *held), key=lambda m: (-sum(self.defects_of(m)), self.score(m, state.mesh).total))
                 n_refits += len(held)
         score = self.score(mesh, state.mesh)
         after = State(mesh, score, state.step + 1, "", trial.action, choice, n_refits, halfway)
@@ -276,7 +333,8 @@ class Simulator:
     def _refit_job(self, mesh: PolyMesh, config: RefitConfig, iou: float, held: BoolArray | None = None) -> Job:
         """A refit of all vertices, or of those that are not `held` (V,)."""
         bonds = self.guidance.bonds(mesh)
-        return partial(refit, mesh, self.refit_target(iou), config, bonds if held is None else holding(bonds, held))
+        bonds = bonds if held is None else holding(bonds, held)
+        return partial(refit, mesh, self.refit_target(iou), config, bonds, self.faces)
 
     def _ended(self, state: State) -> State:
         """The state with its end marked, if this is one."""
@@ -291,7 +349,7 @@ class Simulator:
         bonds = self.guidance.bonds(mesh)
         best, score = mesh, self.final_score(mesh)
         for _ in range(_N_REFINED):
-            fitted = refit(best, self.refit_target(score.iou, self.finest), LOCAL, bonds).mesh
+            fitted = refit(best, self.refit_target(score.iou, self.finest), LOCAL, bonds, self.faces).mesh
             fitted_score = self.final_score(fitted)
             if not fitted_score.total > score.total:
                 break
@@ -301,7 +359,7 @@ class Simulator:
     def polish(self, mesh: PolyMesh) -> PolyMesh:
         """The mesh refined, then tuned at the same resolution: no worse than it was."""
         refined = self.refine(mesh)
-        tuned = tune(refined, self.silhouette.target(self.finest), self.guidance.bonds(mesh))
+        tuned = tune(refined, self.silhouette.target(self.finest), self.guidance.bonds(mesh), self.faces)
         return max((refined, tuned), key=lambda candidate: self.final_score(candidate).total)
 
 

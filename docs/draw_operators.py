@@ -98,11 +98,24 @@ def vertex_merge() -> Example:
     return Example(mesh, 6, ends, Highlight(vertices=(7,), edges=((1, 7),)))
 
 
+def loop_cut() -> Example:
+    """A loop through three quads of an arch."""
+    corners = [(0.1, 0.9), (0.16, 0.3), (0.84, 0.3), (0.9, 0.9), (0.34, 0.9), (0.38, 0.56), (0.62, 0.56), (0.66, 0.9)]
+    mesh = PolyMesh.from_faces(corners, [(0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6)])
+    return Example(mesh, mesh.edge_index(1, 5), Highlight(edges=((1, 5),)))
+
+
+def face_inset() -> Example:
+    """The ring inside a quad."""
+    mesh = PolyMesh.from_faces([(0.12, 0.18), (0.8, 0.12), (0.9, 0.82), (0.2, 0.88)], [(0, 1, 2, 3)])
+    return Example(mesh, 0, Highlight(faces=(0,)))
+
+
 EXAMPLES: dict[str, Callable[[], Example]] = {
     example.__name__: example
     for example in (
         *(edge_subdivide, edge_extrude, face_split, face_delete, face_hole, vertex_dissolve, edge_dissolve),
-        *(edge_cap, edge_fill, vertex_merge),
+        *(edge_cap, edge_fill, vertex_merge, loop_cut, face_inset),
     )
 }
 

@@ -58,6 +58,9 @@ def evaluate(
     override: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="A key of the suite, such as targets.n=10.")
     ] = None,
+    faces: Annotated[
+        str | None, typer.Option(help="Rule of faces: any, convex or quads.", show_default="the suite's")
+    ] = None,
     baseline: Annotated[
         str | None, typer.Option(help="Whom wins and losses are against.", show_default="the suite's")
     ] = None,
@@ -98,7 +101,8 @@ def evaluate(
         folder = out or FOLDER / "merged"
         merge_runs([Path(part) for part in suite], folder, fresh=fresh)
         return _finish(folder, baseline, as_json, shown)
-    found, only = _read(suite[0], override or [], budget, agents, baseline)
+    overrides = [*(override or []), *([] if faces is None else [f"faces={faces}"])]
+    found, only = _read(suite[0], overrides, budget, agents, baseline)
     part = TargetShard.parse(shard)
     folder = out or FOLDER / (found.name + (f"-{part.k}of{part.n}" if part.n > 1 else ""))
     machines = Machines(engine, workers, ray_address)

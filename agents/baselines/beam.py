@@ -7,7 +7,7 @@ from agents.base import Agent, Decision
 from agents.budget import Meter
 from agents.solution import Track
 from autopoly_env.errors import ConfigError
-from autopoly_env.mesh import canonical_hash, is_sane
+from autopoly_env.mesh import canonical_hash
 from autopoly_env.operators import STOP
 from autopoly_env.simulator import Simulator, State
 
@@ -53,7 +53,7 @@ class BeamAgent(Agent):
                 if meter.spent():
                     break
                 states = simulator.transition_all(parent.state)
-                children = [Track(state, parent) for state in states if is_sane(state.mesh)]
+                children = [Track(state, parent) for state in states if simulator.is_sane(state.mesh)]
                 yield from children
                 meter.add(states)
                 tracks += children

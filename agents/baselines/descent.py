@@ -7,7 +7,7 @@ the picture has no gradient and stays where it is. Letters: V vertices, R pixels
 import torch
 
 from autopoly_env.arrays import FloatArray
-from autopoly_env.mesh import PolyMesh, is_sane
+from autopoly_env.mesh import FaceRule, PolyMesh, is_sane
 from autopoly_env.raster.autograd import coverage
 from autopoly_env.silhouette import Target
 
@@ -15,13 +15,16 @@ from autopoly_env.silhouette import Target
 class Descent:
     """Adam (Kingma and Ba 2015) on the weighted sum of squared differences of a mesh's rendering and a target (R, R).
 
-    `mesh` is the best so far, of those without crossings and flipped faces unless `allow_defects`.
+    `mesh` is the best so far, of those without crossings and flipped faces unless `allow_defects`, and of those that
+    keep the rule `faces`.
     """
 
-    def __init__(self, mesh: PolyMesh, target: Target, learning_rate: float, allow_defects: bool) -> None:
+    def __init__(
+        self, mesh: PolyMesh, target: Target, learning_rate: float, allow_defects: bool, faces: FaceRule = "any"
+    ) -> None:
         self.mesh = mesh
         self._least = float("inf")
-        self._allow_defects = allow_defects
+        self._allow_defects, self._faces = allow_defects and faces == "any", faces
         self._wanted = torch.from_numpy(target.coverage.copy())
         self._weights = None if target.weights is None else torch.from_numpy(target.weights.copy())
         self._edges = torch.from_numpy(mesh.topology.boundary_half_edges.copy())
@@ -45,6 +48,6 @@ class Descent:
         if loss.item() < self._least:
             points: FloatArray = self._vertices.detach().numpy()[0].copy()
             mesh = self.mesh.with_vertices(points)
-            if self._allow_defects or is_sane(mesh):
+            if self._allow_defects or is_sane(mesh, self._faces):
                 self._least, self.mesh = loss.item(), mesh
         return loss

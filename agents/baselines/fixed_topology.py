@@ -54,6 +54,8 @@ class DrComplexConfig(DrSimpleConfig):
 class FixedTopologyAgent(WholeAgent):
     """Returns the one state that it is made with."""
 
+    takes_faces = True  # a refit keeps the rule that a rectangle and a grid keep
+
     def __init__(self, name: str, refitted: Callable[[Simulator], State]) -> None:
         self.name = name
         self._refitted = refitted
@@ -71,6 +73,8 @@ class FixedTopologyAgent(WholeAgent):
 class DescentAgent(WholeAgent):
     """Gradient descent from a grid of n x n quads, counted as one refit; its result is not polished afterwards."""
 
+    takes_faces = True
+
     def __init__(self, name: str, config: DrSimpleConfig, n: int, allow_defects: bool) -> None:
         require("learn", f"agent {name!r} with refit=gradient", "torch")
         self.name = name
@@ -82,7 +86,7 @@ class DescentAgent(WholeAgent):
 
         target = simulator.silhouette.target(simulator.resolution)
         start = _grid_over(simulator, self._n)
-        descent = Descent(start, target, self._config.learning_rate, self._allow_defects)
+        descent = Descent(start, target, self._config.learning_rate, self._allow_defects, simulator.faces)
         try:
             descent.run(self._config.iterations)
             meter.count(1, simulator.score(descent.mesh).total)
@@ -109,7 +113,7 @@ def dr_complex(config: DrComplexConfig) -> WholeAgent:
     def refitted(simulator: Simulator) -> State:
         target = RefitTarget.of(simulator.silhouette, simulator.resolution)
         effort = replace(FROM_AFAR, keep_defects=config.allow_defects)
-        mesh = refit(_grid_over(simulator, config.n), target, effort).mesh
+        mesh = refit(_grid_over(simulator, config.n), target, effort, faces=simulator.faces).mesh
         return State(mesh, simulator.score(mesh))
 
     return FixedTopologyAgent("dr-complex", refitted)

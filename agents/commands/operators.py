@@ -1,4 +1,4 @@
-"""The option `--operators` of commands that read construction sequences: operators from outside that these use."""
+"""Options of commands that read construction sequences: operators from outside that these use, the rule of faces."""
 
 from typing import Annotated
 
@@ -11,6 +11,14 @@ OutsideOperators = Annotated[
         metavar="NAMES",
         help="Operators from outside that the sequence uses, my.module:my_operator, separated by commas.",
         show_default="ours",
+    ),
+]
+
+
+FaceRuleOfSequence = Annotated[
+    str | None,
+    typer.Option(
+        "--faces", help="Rule of faces to keep: any, convex or quads.", show_default="the sequence's, if it has one"
     ),
 ]
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from agents.base import Agent, check_guidance
+from agents.base import Agent, check_faces, check_guidance
 from agents.budget import Budget
 from agents.commands.ctrl_c import CtrlC
 from agents.commands.report import Report
@@ -21,6 +21,7 @@ from agents.registry import find_agent
 from autopoly_env.compute import n_threads
 from autopoly_env.errors import AutoPolyError, ConfigError
 from autopoly_env.export import save_png
+from autopoly_env.mesh import face_rule
 from autopoly_env.outside import described
 from autopoly_env.score import ScoreWeights
 from autopoly_env.silhouette import Silhouette, load_silhouette
@@ -40,6 +41,7 @@ class Settings:
     weights: ScoreWeights
     budget: Budget
     wishes: Wishes = NO_WISHES
+    faces: str = "any"  # the rule of faces
 
     def check(self) -> None:
         """Raise ConfigError for whatever is wrong, before any image is read."""
@@ -50,6 +52,7 @@ class Settings:
         wishes = replace(wishes, importance=None)  # so is whether it has the image's proportions
         dummy = replace(self, wishes=wishes).simulator(Silhouette(np.ones((1, 1), np.bool_)))
         check_guidance(agent, dummy.guidance.names)
+        check_faces(agent, dummy)
         if self.budget.simulations is not None and not agent.runs_simulations:
             raise ConfigError(f"{self.agent} runs no simulations to limit: give --refits or --seconds instead")
         n_threads()
@@ -67,6 +70,7 @@ class Settings:
             resolution=self.resolution,
             weights=self.weights,
             max_steps=self.max_steps,
+            faces=face_rule(self.faces),
             **self.wishes.for_simulator(),
         )
 

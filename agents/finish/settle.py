@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from autopoly_env.errors import IllegalActionError
-from autopoly_env.mesh import PolyMesh, is_sane
+from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import OPERATORS, Action, Choice
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence.ids import decoded
@@ -112,7 +112,7 @@ class _Film:
             vertices = mesh.vertices.copy()
             vertices[mesh.vertex_index(name)] = place
             changed.append(mesh.with_vertices(vertices))
-        if not all(map(is_sane, changed)):
+        if not all(map(self._simulator.is_sane, changed)):
             return None
         try:
             for mesh, (action, choice) in zip(changed, self.taken[first:end], strict=True):

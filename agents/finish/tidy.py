@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 from autopoly_env.errors import AutoPolyError
-from autopoly_env.mesh import PolyMesh, is_sane
+from autopoly_env.mesh import FaceRule, PolyMesh, is_sane
 from autopoly_env.operators import operator_named
 from autopoly_env.score import Score
 from autopoly_env.sequence import ConstructionSequence, Step
@@ -83,7 +83,10 @@ def _without(
     ends = [*(k + 1 for k in kept[:-1]), len(steps)]  # the last takes over what moved after it
     follower = Follower(meshes[first], meshes[first], end_rule=_end_beyond, face_rule=_smallest_face)
     try:
-        taken = [_taken(follower, steps[k], meshes[k], meshes[end]) for k, end in zip(kept, ends, strict=False)]
+        taken = [
+            _taken(follower, steps[k], meshes[k], meshes[end], sequence.faces)
+            for k, end in zip(kept, ends, strict=False)
+        ]
     except AutoPolyError:
         return None
     if not _is_same(follower, meshes[-1]):
@@ -99,10 +102,10 @@ def _without(
     return replace(sequence, steps=(*steps[:first], *later.steps))
 
 
-def _taken(follower: Follower, step: Step, before: PolyMesh, after: PolyMesh) -> Taken:
+def _taken(follower: Follower, step: Step, before: PolyMesh, after: PolyMesh, faces: FaceRule) -> Taken:
     """Take a step again. Raises AutoPolyError where that cannot be done, or leaves a mesh that is not sane."""
     taken = follower.take(step, before, after, stay)
-    if not is_sane(follower.mesh):
+    if not is_sane(follower.mesh, faces):
         raise _DetourNeededError("a mesh on the way is not sane without it")
     return taken
 

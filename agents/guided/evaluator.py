@@ -78,7 +78,8 @@ class WarpEvaluator(NfapEvaluator):
 
     The action is applied, then every vertex goes where the warp of the rendering to the target takes it. `placed`: new
     vertices begin where rendering and target disagree, as before a refit. A warp that makes a shape worse is not taken.
-    Locked vertices and symmetry only a refit can heed: where a user has asked for them, it is refits after all.
+    Locked vertices, symmetry and a rule of faces only a refit can heed: where a user has asked for them, it is refits
+    after all.
     """
 
     def __init__(
@@ -88,7 +89,7 @@ class WarpEvaluator(NfapEvaluator):
         self._warp, self._placed = warp, placed
 
     def expand(self, simulator: Simulator, state: State, actions: Sequence[Action]) -> list[State]:
-        if simulator.guidance.locked or simulator.guidance.axis is not None:
+        if simulator.guidance.locked or simulator.guidance.axis is not None or simulator.faces != "any":
             return super().expand(simulator, state, actions)
         if state.done:
             return []

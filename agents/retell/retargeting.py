@@ -6,7 +6,7 @@ construction itself is climbed: of all that are one step shorter (later steps th
 one step longer, refitted, the best is taken while it is better.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,7 +21,7 @@ from autopoly_env.compute import map_threads
 from autopoly_env.errors import AutoPolyError, SequenceError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.raster import coverage
-from autopoly_env.refit import FROM_AFAR, LOCAL, THOROUGH, RefitConfig, refit
+from autopoly_env.refit import FROM_AFAR, LOCAL, THOROUGH, RefitConfig, mended, refit
 from autopoly_env.score import Score
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence.follower import Follower, Taken
@@ -83,7 +83,7 @@ def align(simulator: Simulator, sequence: ConstructionSequence, meter: Meter) ->
     found = [
         version_of(simulator, told.start, _taken(told), range(1, len(told.steps) + 1), laid)
         for told in _both_ways(sequence)
-        for laid in _laid_over(told.final(), simulator)
+        for laid in _allowed(_laid_over(told.final(), simulator), simulator)
     ]
     from_afar = _refitted(simulator, found, FROM_AFAR)
     again = _refitted(simulator, from_afar, THOROUGH)
@@ -92,7 +92,9 @@ def align(simulator: Simulator, sequence: ConstructionSequence, meter: Meter) ->
     settled = [one for one in aligned if one is not None]
     meter.count(2 * len(found), max(map(total_of, settled), default=float("-inf")))
     if not settled:
-        raise SequenceError("its steps cannot be laid over the target without crossings; give another sequence")
+        raise SequenceError(
+            "its steps cannot be laid over the target without crossings or forbidden faces; give another sequence"
+        )
     return settled[:_N_BEGINNINGS]
 
 
@@ -152,6 +154,14 @@ def _laid_over(mesh: PolyMesh, simulator: Simulator) -> Iterator[PolyMesh]:
         yield mesh.with_vertices(np.clip(pixels.mean(axis=0) + (mesh.vertices - own.mean(axis=0)) * stretch, 0.0, 1.0))
 
 
+def _allowed(meshes: Iterable[PolyMesh], simulator: Simulator) -> Iterator[PolyMesh]:
+    """The meshes, mended where they break the simulator's rule of faces; those that cannot be are left out."""
+    for mesh in meshes:
+        made = mesh if simulator.faces == "any" else mended(mesh, simulator.faces)
+        if made is not None:
+            yield made
+
+
 def _on_contours(mesh: PolyMesh, simulator: Simulator) -> PolyMesh:
     """The mesh, roughly in place, with each boundary loop on the best polygon of its size of the nearest contour."""
     rings, vertices = trace_rings(simulator.silhouette), mesh.vertices.copy()
@@ -179,7 +189,7 @@ def _refitted(simulator: Simulator, versions: Sequence[Version], config: RefitCo
     """Each with its last mesh refitted, on all cores."""
 
     def fit(version: Version) -> Version:
-        mesh = refit(version.mesh, simulator.refit_target(version.score.iou), config).mesh
+        mesh = refit(version.mesh, simulator.refit_target(version.score.iou), config, faces=simulator.faces).mesh
         return replace(version, mesh=mesh, score=simulator.score(mesh))
 
     return map_threads(fit, versions)

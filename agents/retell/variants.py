@@ -37,9 +37,9 @@ class Variant:
 def draw_variants(sequence: ConstructionSequence, n: int, amount: float, seed: int) -> Iterator[Variant | None]:
     """`n` variants that differ, None for one that was not found in `N_TRIES` draws.
 
-    Every mesh on the way is free of self-intersections and flipped faces and lies in the unit square: what leaves it is
-    scaled down as a whole. `amount` is how far an edit pulls, in the unit square. Raises SequenceError where the
-    sequence itself has a defect.
+    Every mesh on the way is free of self-intersections and flipped faces, keeps the sequence's rule of faces, and lies
+    in the unit square: what leaves it is scaled down as a whole. `amount` is how far an edit pulls, in the unit square.
+    Raises SequenceError where the sequence itself has a defect.
     """
     check_sound(sequence)
     meshes = sequence.meshes()
@@ -75,13 +75,15 @@ def _draw(
         scale, shift = _fitting(moved)
         if any(_is_like(final, scale * moved[-1] + shift, _SAME * amount) for final in finals):
             continue
-        if not all(is_sane(mesh.with_vertices(points)) for mesh, points in zip(meshes, moved, strict=True)):
+        if not all(
+            is_sane(mesh.with_vertices(points), sequence.faces) for mesh, points in zip(meshes, moved, strict=True)
+        ):
             continue
         try:
             varied = sequence.moved_by(partial(_place, k, bend, scale, shift))
         except AutoPolyError:  # a later step has no room
             continue
-        if all(map(is_sane, varied.meshes())):
+        if all(is_sane(mesh, sequence.faces) for mesh in varied.meshes()):
             names = tuple(meshes[k].vertex_ids[v] for v in np.flatnonzero(pulls.any(axis=1)))
             return Variant(varied, k, names, n_tries)
     return None

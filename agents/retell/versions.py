@@ -7,9 +7,9 @@ from functools import cached_property
 import numpy as np
 
 from autopoly_env.errors import AutoPolyError
-from autopoly_env.mesh import PolyMesh, is_sane
+from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import HOLE_SIDES, OPERATORS, Action
-from autopoly_env.placement import Disagreement, tried
+from autopoly_env.placement import Disagreement
 from autopoly_env.score import Score
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence.deformation import ThinPlate
@@ -63,7 +63,7 @@ def total_of(version: Version) -> float:
 def first_settled(simulator: Simulator, versions: Sequence[Version]) -> Version | None:
     """The best that can be told with all of its meshes sane."""
     for version in sorted(versions, key=total_of, reverse=True):
-        settled = _settled(simulator, version) if is_sane(version.mesh) else None
+        settled = _settled(simulator, version) if simulator.is_sane(version.mesh) else None
         if settled is not None:
             return settled
     return None
@@ -74,22 +74,22 @@ def _settled(simulator: Simulator, version: Version) -> Version | None:
     told, last = version.sequence, version.mesh
     meshes = told.meshes()
     bend = ThinPlate.through(meshes[-1].vertices, last.vertices)
-    start = _brought(meshes[0], last)
+    start = _brought(simulator, meshes[0], last)
     follower, taken = Follower(meshes[0], start), []
     for i, step in enumerate(told.steps, 1):
         try:
             action, choice, made = follower.take(step, meshes[i - 1], meshes[i], bend, is_moving=False)
         except AutoPolyError:  # no room for a diagonal or a hole
             return None
-        mesh = last if i == len(told.steps) else _brought(made, last)
-        if mesh.vertex_ids != made.vertex_ids or not is_sane(mesh):
+        mesh = last if i == len(told.steps) else _brought(simulator, made, last)
+        if mesh.vertex_ids != made.vertex_ids or not simulator.is_sane(mesh):
             return None
         follower.settle(mesh)
         taken.append((action, choice, mesh))
     return replace(version, start=start, taken=tuple(taken))
 
 
-def _brought(mesh: PolyMesh, last: PolyMesh) -> PolyMesh:
+def _brought(simulator: Simulator, mesh: PolyMesh, last: PolyMesh) -> PolyMesh:
     """The mesh with the vertices that stay to the end where they are then, as far as that leaves no defect.
 
     Where all of them cannot be there at once, they go one after the other, those that cannot staying behind.
@@ -97,18 +97,18 @@ def _brought(mesh: PolyMesh, last: PolyMesh) -> PolyMesh:
     ends = dict(zip(last.vertex_ids, last.vertices.tolist(), strict=True))
     goals = {name: ends[name] for name in mesh.vertex_ids if name in ends}
     moved = moved_to(mesh, goals)
-    if is_sane(moved):
+    if simulator.is_sane(moved):
         return moved
     for name, goal in goals.items():
         moved = moved_to(mesh, {name: goal})
-        mesh = moved if is_sane(moved) else mesh
+        mesh = moved if simulator.is_sane(moved) else mesh
     return mesh
 
 
 def neighbours(simulator: Simulator, version: Version) -> list[Version]:
     """All versions that are one step away, the last mesh not refitted yet."""
     found = [*_shorter(simulator, version), *_longer(simulator, version)]
-    return [one for one in found if len(one.taken) <= simulator.max_steps and is_sane(one.mesh)]
+    return [one for one in found if len(one.taken) <= simulator.max_steps and simulator.is_sane(one.mesh)]
 
 
 def _shorter(simulator: Simulator, version: Version) -> Iterator[Version]:
@@ -138,7 +138,7 @@ def _longer(simulator: Simulator, version: Version) -> Iterator[Version]:
         if action.operator not in simulator.operators:
             continue
         try:
-            choice, mesh, _ = tried(disagreement, action).starts[0]
+            choice, mesh, _ = simulator.trial_of(disagreement, action).starts[0]
         except AutoPolyError:
             continue
         yield version_of(

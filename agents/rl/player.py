@@ -67,10 +67,8 @@ class Player:
         mask = self.codec.legal_mask(state.mesh)
         for unknown in set(self.spec.operators).difference(simulator.operators):
             mask[self.codec.indices_of(unknown)] = False
-        if simulator.guidance.names:
-            allowed = np.zeros_like(mask)
-            allowed[[0, *self._indices(simulator.legal_actions(state))]] = True
-            mask &= allowed
+        if simulator.guidance.names or simulator.faces != "any":
+            mask &= self.codec.mask_of(simulator.legal_actions(state))
         return mask
 
     def logits(self, simulators: Sequence[Simulator], states: Sequence[State]) -> FloatArray:
@@ -142,11 +140,3 @@ class Player:
         logits = self.logits([simulator], [state])[0]
         legal = np.flatnonzero(logits > 0.5 * NEVER)
         return legal, logits[legal]
-
-    def _indices(self, actions: Sequence[Action]) -> Iterator[int]:
-        """The numbers of the actions that have one."""
-        for action in actions:
-            try:
-                yield self.codec.encode(action)
-            except IllegalActionError:
-                continue

@@ -20,12 +20,14 @@ _MOST_AT_ONCE = 2  # steps of a sequence that are one of the simulator's: an act
 def play(agents: Sequence[Agent], simulator: Simulator, meter: Meter) -> Iterator[Solution]:
     """The agents' solutions, as far as the budget goes. Raises KeyboardInterrupt after one that was interrupted.
 
-    Agents that cannot take the simulator's guidance are left out.
+    Agents that cannot take the simulator's guidance, or keep its rule of faces, are left out.
     """
     for agent in agents:
         if meter.spent():
             return
         if simulator.guidance.names and not agent.takes_guidance:
+            continue
+        if simulator.faces != "any" and not agent.takes_faces:
             continue
         solution = _solve_within(agent, simulator, meter)
         yield solution

@@ -90,8 +90,8 @@ class MctsAgent(Agent):
                 finds.tops.add(top)
 
     def _hops(self, simulator: Simulator) -> bool:
-        """Whether the search goes on among outlines, which heed no guidance."""
-        return self._config.hop_patience > 0 and not simulator.guidance.names
+        """Whether the search goes on among outlines, which heed no guidance and no rule of faces."""
+        return self._config.hop_patience > 0 and not simulator.guidance.names and simulator.faces == "any"
 
     def _search(self, simulator: Simulator, track: Track, meter: Meter) -> Iterator[Track]:
         """Search, commit, and so on; yield every track that is the best so far."""

@@ -148,6 +148,28 @@ class Topology:
         return _read_only(np.array(rows, np.int64).reshape(-1, 2))
 
     @cached_property
+    def boundary_labels(self) -> IntArray:
+        """(B,2) the loop and the part of each row of `boundary_half_edges`; a part is faces that edges join."""
+        part = self._part_of_face()
+        faces = self.links.faces
+        rows = [(i, part[faces[h]]) for i, loop in enumerate(self._boundary) for h in loop]
+        return _read_only(np.array(rows, np.int64).reshape(-1, 2))
+
+    def _part_of_face(self) -> list[int]:
+        links, part = self.links, [-1] * self.n_faces
+        for first in range(self.n_faces):
+            if part[first] >= 0:
+                continue
+            part[first], left = first, [first]
+            while left:
+                f = left.pop()
+                for g in links.twins[links.offsets[f] : links.offsets[f + 1]]:
+                    if g >= 0 and part[links.faces[g]] < 0:
+                        part[links.faces[g]] = first
+                        left.append(links.faces[g])
+        return part
+
+    @cached_property
     def is_boundary_edge(self) -> BoolArray:
         """(E,) whether the edge has one face."""
         return _read_only(np.array([g < 0 for _, g in self.edge_half_edges], np.bool_))

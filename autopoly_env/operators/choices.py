@@ -95,6 +95,22 @@ def _renamed_edge(ids: ChoiceIds, renaming: Renaming) -> ChoiceIds:
     return {"to": [renaming.vertex(name) for name in ids["to"]]}
 
 
+def _slide_ids(mesh: PolyMesh, edge: int, choice: Choice) -> ChoiceIds:
+    assert isinstance(choice, int | float | np.floating)
+    return {"from": mesh.vertex_ids[mesh.edges[edge][0]], "slide": float(choice)}
+
+
+def _slide(mesh: PolyMesh, edge: int, ids: ChoiceIds) -> Choice:
+    match ids:
+        case {"from": int(end), "slide": float(slide), **rest} if not rest and not isinstance(end, bool):
+            ends = [mesh.vertex_ids[v] for v in mesh.edges[edge]]
+            if end in ends:
+                return slide if end == ends[0] else 1.0 - slide
+    raise SequenceError(
+        f"choice {shortened(ids)}: expected an end of the edge and how far from it, {{'from': id, 'slide': 0.5}}"
+    )
+
+
 def _hole_choice_ids(mesh: PolyMesh, hole: int, choice: Choice) -> ChoiceIds:
     assert isinstance(choice, HoleChoice)
     face = mesh.faces[hole_face(hole)[0]]
@@ -127,5 +143,6 @@ def _renamed_hole(ids: ChoiceIds, renaming: Renaming) -> ChoiceIds:
 
 TO_CORNER = ChoiceCodec(_corner_choice_ids, _corner_choice, lambda ids, r: {"to": r.vertex(ids["to"])})
 TO_VERTEX = ChoiceCodec(_vertex_choice_ids, _vertex_choice, lambda ids, r: {"to": r.vertex(ids["to"])})
+SLIDE = ChoiceCodec(_slide_ids, _slide, lambda ids, r: {"from": r.vertex(ids["from"]), "slide": ids["slide"]})
 TO_EDGE = ChoiceCodec(_edge_choice_ids, _edge_choice, _renamed_edge)
 OF_HOLE = ChoiceCodec(_hole_choice_ids, _hole_choice, _renamed_hole)

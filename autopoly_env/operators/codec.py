@@ -1,6 +1,7 @@
 """Actions by number, for a Discrete action space; which are legal; and what they are in words."""
 
 from collections.abc import Iterable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -80,6 +81,15 @@ class ActionCodec:
             legal = self._within_capacity(operator, mesh)
             start, n = self._start[operator.name], min(len(legal), self._capacity(operator))
             mask[start : start + n] = legal[:n]
+        return mask
+
+    def mask_of(self, actions: Iterable[Action]) -> BoolArray:
+        """(n_actions,) STOP and those of the actions that have an index."""
+        mask = np.zeros(self.n_actions, np.bool_)
+        mask[0] = True
+        for action in actions:
+            with suppress(IllegalActionError):
+                mask[self.encode(action)] = True
         return mask
 
     def _capacity(self, operator: Operator) -> int:

@@ -15,7 +15,7 @@ from autopoly_env.operators.evidence import Evidence
 from autopoly_env.operators.fill_kernels import fill_costs, fillable
 from autopoly_env.operators.mirroring import again
 from autopoly_env.operators.operator import Mirroring, Operator
-from autopoly_env.operators.rebuilding import ends_along_face, grown, refusal
+from autopoly_env.operators.rebuilding import ends_along_face, grown, refusal, rim_defect
 from autopoly_env.operators.wording import EDGES, Gesture, Phrases, Told, begun_with, element_words
 
 N_STARTS = 3  # faces to begin with: those over most of what is missing
@@ -24,8 +24,8 @@ N_STARTS = 3  # faces to begin with: those over most of what is missing
 def edges_with_partner(mesh: PolyMesh) -> BoolArray:
     """(E,) the boundary edges that a convex face with nothing in its way joins with another."""
     mask = np.zeros(mesh.topology.n_edges, np.bool_)
-    rim = mesh.topology.boundary_half_edges
-    for (a, b), is_legal in zip(rim.tolist(), fillable(mesh.vertices, mesh.edges, rim), strict=True):
+    rim, labels = mesh.topology.boundary_half_edges, mesh.topology.boundary_labels
+    for (a, b), is_legal in zip(rim.tolist(), fillable(mesh.vertices, mesh.edges, rim, labels), strict=True):
         mask[mesh.edge_index(a, b)] = is_legal
     return mask
 
@@ -36,7 +36,7 @@ def partners(mesh: PolyMesh, edge: int) -> list[int]:
     rows = {mesh.edge_index(a, b): row for row, (a, b) in enumerate(rim.tolist())}
     if edge not in rows:
         return []
-    costs = fill_costs(mesh.vertices, mesh.edges, rim, rows[edge])
+    costs = fill_costs(mesh.vertices, mesh.edges, rim, mesh.topology.boundary_labels, rows[edge])
     return sorted((other for other, row in rows.items() if costs[row] < np.inf), key=lambda o: (costs[rows[o]], o))
 
 
@@ -75,9 +75,9 @@ def _corners(mesh: PolyMesh, edge: int, other: Choice | None) -> Face | str:
     sides = list(zip(corners, (*corners[1:], corners[0]), strict=True))
     if not all(_is_free(mesh, v, w) for v, w in sides):
         return f"an edge of the face to edge {other} has two faces already; choose another"
-    n_joined = sum((min(side), max(side)) in mesh.topology.edge_lookup for side in sides)
-    if n_joined == len(sides) == len(mesh.topology.boundary_half_edges):
-        return "no boundary would be left; choose another"
+    defect = rim_defect(mesh, [(w, v) for v, w in sides])
+    if defect:
+        return f"{defect}; choose another"
     return corners
 
 

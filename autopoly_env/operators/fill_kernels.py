@@ -11,48 +11,50 @@ from autopoly_env.compute import kernel
 from autopoly_env.mesh.planar_kernels import cross, point_on_segment, segments_touch
 
 LEAST_SINE_SQUARED = 1e-4  # of the angle at a corner
-_FREE, _INNER, _ALONG, _AGAINST = range(4)  # of an ordered pair of vertices: no edge, one inside, one on the boundary
+_FREE, _TAKEN = -1, -2  # of an ordered pair of vertices: no edge joins them, or a face runs that way, or two have it
 
 
 @kernel
-def fillable(vertices: FloatArray, edges: IntArray, rim: IntArray) -> BoolArray:
-    """(B,) the rows of `rim` (B, 2) that a good face joins with another: see `fill_costs`."""
+def fillable(vertices: FloatArray, edges: IntArray, rim: IntArray, labels: IntArray) -> BoolArray:
+    """(B,) the rows of `rim` (B, 2) that a good face joins with another, see `fill_costs`; `labels` of the topology."""
     pairs = _pairs(len(vertices), edges, rim)
     mask = np.zeros(len(rim), np.bool_)
     for i in range(len(rim)):
         for j in range(i):
-            if not (mask[i] and mask[j]) and _cost(vertices, edges, rim, pairs, i, j) < np.inf:
+            if not (mask[i] and mask[j]) and _cost(vertices, edges, rim, labels, pairs, i, j) < np.inf:
                 mask[i] = mask[j] = True
     return mask
 
 
 @kernel
-def fill_costs(vertices: FloatArray, edges: IntArray, rim: IntArray, i: int) -> FloatArray:
+def fill_costs(vertices: FloatArray, edges: IntArray, rim: IntArray, labels: IntArray, i: int) -> FloatArray:
     """(B,) of a face between row i of `rim` (B, 2) and each other: how long its new sides are (squared) by its area.
 
-    inf where it would be no good: not strictly convex, wound the other way, over another edge or vertex, or on an edge
-    that has two faces.
+    inf where it would be no good: not strictly convex, wound the other way, over another edge or vertex, on an edge
+    that has two faces, or a handle, which no mesh in the plane has.
     """
     pairs = _pairs(len(vertices), edges, rim)
     costs = np.full(len(rim), np.inf)
     for j in range(len(rim)):
-        costs[j] = _cost(vertices, edges, rim, pairs, i, j)
+        costs[j] = _cost(vertices, edges, rim, labels, pairs, i, j)
     return costs
 
 
 @kernel
 def _pairs(n: int, edges: IntArray, rim: IntArray) -> IntArray:
-    """(V, V) what joins each ordered pair of vertices."""
+    """(V, V) the row of `rim` that runs against each ordered pair of vertices; else whether an edge joins them."""
     pairs = np.full((n, n), _FREE)
     for e in range(len(edges)):
-        pairs[edges[e, 0], edges[e, 1]] = pairs[edges[e, 1], edges[e, 0]] = _INNER
+        pairs[edges[e, 0], edges[e, 1]] = pairs[edges[e, 1], edges[e, 0]] = _TAKEN
     for h in range(len(rim)):
-        pairs[rim[h, 0], rim[h, 1]], pairs[rim[h, 1], rim[h, 0]] = _ALONG, _AGAINST
+        pairs[rim[h, 1], rim[h, 0]] = h
     return pairs
 
 
 @kernel
-def _cost(vertices: FloatArray, edges: IntArray, rim: IntArray, pairs: IntArray, i: int, j: int) -> float:
+def _cost(
+    vertices: FloatArray, edges: IntArray, rim: IntArray, labels: IntArray, pairs: IntArray, i: int, j: int
+) -> float:
     a, b, c, d = rim[i, 0], rim[i, 1], rim[j, 0], rim[j, 1]
     if a == c or b == d:  # which also is i == j
         return np.inf
@@ -64,14 +66,16 @@ def _cost(vertices: FloatArray, edges: IntArray, rim: IntArray, pairs: IntArray,
     n, n_new, new = len(face), 0, 0.0
     for k in range(n):
         v, w = face[k], face[(k + 1) % n]
-        if pairs[v, w] == _INNER or pairs[v, w] == _ALONG:
-            return np.inf
-        if not _turns(vertices, v, w, face[(k + 2) % n]):
+        if pairs[v, w] == _TAKEN or not _turns(vertices, v, w, face[(k + 2) % n]):
             return np.inf
         if pairs[v, w] == _FREE:
             n_new += 1
             new += (vertices[w, 0] - vertices[v, 0]) ** 2 + (vertices[w, 1] - vertices[v, 1]) ** 2
-    if n_new == 0 and n == len(rim):  # no boundary would be left
+        for m in range(k):
+            one, two = pairs[v, w], pairs[face[m], face[m + 1]]
+            if one >= 0 and two >= 0 and labels[one, 0] != labels[two, 0] and labels[one, 1] == labels[two, 1]:
+                return np.inf  # it would join two loops of one part, which is a handle
+    if n_new == 0 and (labels[:, 1] == labels[i, 1]).sum() == n:  # no boundary would be left
         return np.inf
     if not _is_clear(vertices, edges, face, pairs):
         return np.inf

@@ -1,6 +1,6 @@
 """What operators are made of: meshes grown and shrunk, corners looked up, refusals that say why."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -71,6 +71,22 @@ def ends_along_face(mesh: PolyMesh, edge: int) -> tuple[int, int]:
     half_edge, _ = mesh.topology.edge_half_edges[edge]
     links = mesh.topology.links
     return links.tails[half_edge], links.heads[half_edge]
+
+
+def rim_defect(mesh: PolyMesh, rim: Iterable[tuple[int, int]]) -> str:
+    """Why boundary half-edges, of those in `rim` that are there, cannot get faces that hang together; or nothing.
+
+    Of each part of the mesh they have to lie on one boundary loop: to join two makes a handle, which no mesh in the
+    plane has, and V - E + F would not be components - holes any more.
+    """
+    topology = mesh.topology
+    rows = dict(zip(map(tuple, topology.boundary_half_edges.tolist()), topology.boundary_labels.tolist(), strict=True))
+    found = [tuple(rows[pair]) for pair in set(rim) if pair in rows]
+    if len(set(found)) > len({part for _, part in found}):
+        return "it would join two boundaries of one part, as a handle does"
+    if any(len(found) == sum(part == other for _, other in rows.values()) for part in {part for _, part in found}):
+        return "no boundary would be left"
+    return ""
 
 
 def corners_from_last(mesh: PolyMesh, face: int, *vertex_ids: int) -> list[int]:

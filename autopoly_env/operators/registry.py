@@ -11,14 +11,17 @@ from autopoly_env.operators.edge_fill import edge_fill
 from autopoly_env.operators.edge_subdivide import edge_subdivide
 from autopoly_env.operators.face_delete import face_delete
 from autopoly_env.operators.face_hole import face_hole
+from autopoly_env.operators.face_inset import face_inset
 from autopoly_env.operators.face_split import face_split
+from autopoly_env.operators.loop_cut import loop_cut
 from autopoly_env.operators.operator import Operator
 from autopoly_env.operators.vertex_dissolve import vertex_dissolve
 from autopoly_env.operators.vertex_merge import vertex_merge
 
 _PAPER = (edge_subdivide, edge_extrude, face_split, face_delete)
 _FULL = (*_PAPER, face_hole, vertex_dissolve, edge_dissolve)
-_MODELLER = (edge_extrude, edge_cap, edge_fill, vertex_merge, face_delete, vertex_dissolve, edge_dissolve)
+_BUILDING = (edge_extrude, edge_cap, edge_fill, vertex_merge, loop_cut, face_inset)
+_MODELLER = (*_BUILDING, face_delete, vertex_dissolve, edge_dissolve)
 PRESETS: dict[str, tuple[Operator, ...]] = {"paper": _PAPER, "full": _FULL, "modeller": _MODELLER}
 OPERATORS: dict[str, Operator] = {operator.name: operator for operator in (*_FULL, *_MODELLER)}  # all that are known
 

@@ -16,7 +16,7 @@ from autopoly_env.operators.elements import VERTEX
 from autopoly_env.operators.evidence import Evidence
 from autopoly_env.operators.mirroring import again, moved
 from autopoly_env.operators.operator import Mirroring, Operator
-from autopoly_env.operators.rebuilding import refusal, shrunk
+from autopoly_env.operators.rebuilding import refusal, rim_defect, shrunk
 from autopoly_env.operators.wording import VERTICES, Gesture, Phrases, Told, element_words
 
 N_STARTS = 2  # vertices to merge with: those across most of what is missing
@@ -25,6 +25,7 @@ N_STARTS = 2  # vertices to merge with: those across most of what is missing
 class _Around(NamedTuple):
     """What lies around the vertices of a mesh, by vertex."""
 
+    mesh: PolyMesh
     faces: defaultdict[int, set[int]]
     neighbours: defaultdict[int, set[int]]
     after: defaultdict[int, list[int]]  # the next vertices on the boundary; several at a pinch
@@ -32,7 +33,7 @@ class _Around(NamedTuple):
 
 
 def _around(mesh: PolyMesh) -> _Around:
-    around = _Around(defaultdict(set), defaultdict(set), defaultdict(list), defaultdict(list))
+    around = _Around(mesh, defaultdict(set), defaultdict(set), defaultdict(list), defaultdict(list))
     for f, face in enumerate(mesh.faces):
         for v in face:
             around.faces[v].add(f)
@@ -99,8 +100,10 @@ def _defect(vertex: int, other: int, around: _Around) -> str:
         is_against = w in around.before[vertex] and other in around.before[w]
         if not is_along and not is_against:
             return f"an edge of more than two faces would lead to vertex {w}; choose another"
-    if 2 * len(common) == sum(map(len, around.after.values())):
-        return "no boundary would be left; choose another"
+    ends = [(p, q) for w in common for v in (vertex, other) for p, q in ((v, w), (w, v)) if q in around.after[p]]
+    defect = rim_defect(around.mesh, ends)
+    if defect:
+        return f"{defect}; choose another"
     return ""
 
 

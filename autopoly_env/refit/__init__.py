@@ -1,5 +1,6 @@
 """Inverse shape estimation: vertices moved to match a target, by least squares and by the last fractions of a pixel."""
 
+from autopoly_env.refit.mending import mended
 from autopoly_env.refit.refitting import (
     DEFAULT,
     FROM_AFAR,
@@ -24,6 +25,7 @@ __all__ = [
     "RefitResult",
     "RefitTarget",
     "holding",
+    "mended",
     "refit",
     "tune",
 ]

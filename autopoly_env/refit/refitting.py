@@ -116,9 +116,7 @@ def refit(
     """
     if not np.isfinite(mesh.vertices).all():
         raise MeshError("the mesh to refit has vertices that are not finite: give finite positions")
-    shape = shape_of(mesh.topology) if faces == "any" else _ruled(mesh.topology)
-    if bonds is not None:
-        shape = _bound(shape, bonds)
+    shape = shape_for(mesh.topology, faces, bonds)
     moved = np.empty_like(mesh.vertices)
     before, after, n_evaluations = refit_kernels.refit(
         mesh.vertices,
@@ -137,6 +135,12 @@ def refit(
         moved,
     )
     return RefitResult(mesh.with_vertices(moved), before, after, n_evaluations)
+
+
+def shape_for(topology: Topology, faces: FaceRule, bonds: Bonds | None) -> Shape:
+    """What the kernels need for a refit under a rule of faces and bonds."""
+    shape = shape_of(topology) if faces == "any" else _ruled(topology)
+    return shape if bonds is None else _bound(shape, bonds)
 
 
 def _with_background(target: Target, background: float) -> Target:

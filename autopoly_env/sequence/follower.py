@@ -98,9 +98,12 @@ class Follower:
         element = operator.element.index(self.mesh, self._element(step, before))
         choice = choice_indices(self.mesh, operator, element, self._choice(operator, step, place))
         made = operator.apply(self.mesh, element, choice)
-        created = [name for name in made.vertex_ids if name >= self.mesh.next_vertex_id]
-        olds = step.created["vertices"]
-        self.names.update(zip(olds, reversed(created) if self._is_mirrored else created, strict=True))
+        created, olds = _created(self.mesh, made), step.created["vertices"]
+        if len(created) != len(olds):
+            raise SequenceError(f"it makes {len(created)} vertices here, not {len(olds)}; drop this step")
+        if self._is_mirrored:
+            created = _mirror_images(*decoded(before, step), before, made, created)
+        self.names.update(zip(olds, created, strict=True))
         self.mesh = self._placed(made, after, place) if is_moving else made
         self._standing = Standing(self.names, after, self.mesh)
         return Action(step.operator, element), choice, self.mesh
@@ -148,6 +151,27 @@ class Follower:
         places = zip(after.vertex_ids, place(after.vertices).tolist(), strict=True)
         named = {names.get(name, -1): (x, y) for name, (x, y) in places}
         return moved_to(made, {name: position for name, position in named.items() if name in present})
+
+
+def _created(before: PolyMesh, made: PolyMesh) -> list[int]:
+    """The ids of the vertices that an operator has made."""
+    return [name for name in made.vertex_ids if name >= before.next_vertex_id]
+
+
+def _mirror_images(
+    operator: Operator, element: int, choice: Choice | None, before: PolyMesh, made: PolyMesh, created: list[int]
+) -> list[int]:
+    """Of the vertices that the operator makes of the old mesh `before`, those of `made` that are their mirror images.
+
+    The operator puts them where the others' mirror images lie; which order it makes them in is its own affair.
+    """
+    old = operator.apply(before, element, choice)
+    left, images = created[::-1], []
+    for name in _created(before, old):
+        x, y = old.vertices[old.vertex_index(name)].tolist()
+        ways = made.vertices[[made.vertex_index(other) for other in left]] - (1.0 - x, y)
+        images.append(left.pop(int(np.argmin((ways**2).sum(axis=1)))))
+    return images
 
 
 def _gone(kind: str, name: int) -> SequenceError:

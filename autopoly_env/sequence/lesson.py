@@ -23,7 +23,7 @@ LEAST_TURN = -1e-9  # cross product (unit square) of the edges at a corner; with
 class Lesson:
     """How a sequence of n steps, and so n + 1 meshes, reads."""
 
-    valid: float  # 0 to 1, share of the meshes without crossings and without flipped or empty faces: 1 is expected
+    valid: float  # 0 to 1, share of the meshes without crossings and flipped, empty or forbidden faces: 1 is expected
     blocking_in: float  # 0 to 1, area under the curve of r_sm over the steps: high where the big shape comes first
     moved: float  # 0 to 1, mean share of the vertices already there that a step moves: LOW is good, 0 is local
     n_actions: int  # n
@@ -52,7 +52,7 @@ class Lesson:
         shares = [share_moved(before, after) for before, after in pairwise(meshes)]
         sizes = [len(face) for face in meshes[-1].faces]
         return cls(
-            valid=sum(is_sane(mesh) for mesh in meshes) / len(meshes),
+            valid=sum(is_sane(mesh, sequence.faces) for mesh in meshes) / len(meshes),
             blocking_in=_area_below(ious),
             moved=float(np.mean(shares)) if shares else 0.0,
             n_actions=len(shares),

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from autopoly_env.errors import AutoPolyError, SequenceError
+from autopoly_env.errors import AutoPolyError, ConfigError, MeshError, SequenceError
 from autopoly_env.files import write_atomically
-from autopoly_env.mesh import PolyMesh
+from autopoly_env.mesh import FaceRule, PolyMesh, check_faces, face_rule
 from autopoly_env.operators import STOP, Action, Choice
 from autopoly_env.operators.wording import element_words
 from autopoly_env.sequence import variation
@@ -44,7 +44,7 @@ class ConstructionSequence:
 
         A choice of None is recorded as what the operator chooses by default. STOP is left out: it changes
         nothing. Raises SequenceError if a mesh is not what its action makes of the one before it, moved
-        vertices aside.
+        vertices aside, and if one breaks the rule of faces that the settings name.
         """
         mesh, steps = start, []
         for number, (action, choice, after, score) in enumerate(transitions, 1):
@@ -58,7 +58,39 @@ class ConstructionSequence:
             check_score(score, f"step {number}")
             mesh = after
         check_score(start_score, "start")
-        return cls(_plain(settings), start, _plain(start_score), tuple(steps))
+        sequence = cls(_plain(settings), start, _plain(start_score), tuple(steps))
+        sequence._check_faces()
+        return sequence
+
+    @property
+    def faces(self) -> FaceRule:
+        """The rule of faces that the settings name; "any" where they name none. Raises SequenceError for another."""
+        try:
+            return face_rule(self.settings.get("faces", "any"))
+        except ConfigError as error:
+            raise SequenceError(f"settings: {error}") from None
+
+    def under(self, faces: str | None) -> "ConstructionSequence":
+        """The sequence under another rule of faces; itself for None.
+
+        Raises SequenceError for a rule that there is not, and naming the first mesh and face that break it.
+        """
+        if faces is None:
+            return self
+        settings = {name: value for name, value in self.settings.items() if name != "faces"}
+        ruled = replace(self, settings=settings if faces == "any" else {**settings, "faces": faces})
+        ruled._check_faces()
+        return ruled
+
+    def _check_faces(self) -> None:
+        """Raise SequenceError naming the first mesh that breaks the rule of faces."""
+        if self.faces == "any":
+            return
+        for number, mesh in enumerate(self.meshes()):
+            try:
+                check_faces(mesh, self.faces, "the start mesh" if number == 0 else f"the mesh after step {number}")
+            except MeshError as error:
+                raise SequenceError(str(error)) from None
 
     @cached_property
     def _meshes(self) -> tuple[PolyMesh, ...]:
@@ -182,10 +214,12 @@ class ConstructionSequence:
     def from_json(cls, text: str) -> "ConstructionSequence":
         """The sequence in a JSON text, replayed once as a check.
 
-        Raises SequenceError if the text is damaged, of another format, or cannot be replayed.
+        Raises SequenceError if the text is damaged, of another format, cannot be replayed, or has a mesh that breaks
+        the rule of faces that its settings name.
         """
         sequence = cls(*parse_json(text))
         sequence.meshes()
+        sequence._check_faces()
         return sequence
 
     def _repr_html_(self) -> str:

@@ -28,6 +28,8 @@ CHAPEL: tuple[tuple[str, Mapping[str, Any], Mapping[str, Any] | None, Mapping[in
     ("edge_extrude", {"edge": [2, 3]}, None, {6: (0.7, 0.85), 7: (0.3, 0.9)}),
     ("edge_extrude", {"edge": [2, 5]}, None, {8: (0.95, 0.6), 9: (0.85, 0.85)}),
     ("vertex_merge", {"vertex": 9}, {"to": 6}, {}),
+    ("loop_cut", {"edge": [0, 1]}, {"from": 0, "slide": 0.25}, {}),
+    ("face_inset", {"face": 6}, None, {}),
 )
 
 

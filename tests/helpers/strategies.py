@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import OPERATORS, Action, Choice, legal_actions, preset
 
+_GROWING = ("loop_cut", "face_inset")  # what would make meshes ever larger on a long walk
+
 
 class Transition(NamedTuple):
     """One step of a walk."""
@@ -28,7 +30,7 @@ def random_walk(seed: int, operators: str = "full", n_steps: int = 40, shake: fl
     names = [operator.name for operator in preset(operators)]
     for _ in range(n_steps):
         by_operator = defaultdict(list)
-        for action in legal_actions(mesh, names):
+        for action in legal_actions(mesh, [name for name in names if name not in _GROWING or len(mesh.faces) < 25]):
             by_operator[action.operator].append(action)
         action = rng.choice(by_operator[rng.choice(sorted(by_operator))])
         operator = OPERATORS[action.operator]

@@ -16,6 +16,7 @@ from agents.budget import Budget
 from agents.options import put_override, read_yaml
 from agents.registry import AGENTS, SUFFIXES, find_agent
 from autopoly_env.errors import AutoPolyError, ConfigError
+from autopoly_env.mesh import FaceRule
 from autopoly_env.score import ScoreWeights
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator
@@ -68,6 +69,7 @@ class Suite:
     operators: str = "full"
     resolution: int = 128  # at which the agents work; they are scored at the target's own
     max_steps: int = 100
+    faces: FaceRule = "any"  # the rule of faces that all agents keep
     budget: Budget = field(default_factory=Budget)
     seeds: tuple[int, ...] = (0,)
     baseline: str = ""  # the label that the others are compared with; the first if empty
@@ -103,6 +105,7 @@ class Suite:
             resolution=self.resolution,
             weights=weights,
             max_steps=self.max_steps,
+            faces=self.faces,
         )
 
     def new_agent(self, entry: Entry, seed: int) -> Agent:

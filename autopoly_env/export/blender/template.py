@@ -141,6 +141,40 @@ def vertex_merge(name: int, other: int) -> None:
     bmesh.ops.weld_verts(bm, targetmap={vertex(name): vertex(other)})
 
 
+def loop_cut(rungs: tuple[tuple[int, int], ...], slide: float, quads: tuple[tuple[int, int], ...]) -> None:
+    """An edge loop through quads, across the edges `rungs`, at `slide` from the first end of each to the other.
+
+    Of every quad, by its number, the part with the given corner keeps the number.
+    """
+    made = bmesh.ops.subdivide_edges(bm, edges=[edge(a, b) for a, b in rungs], cuts=1, use_grid_fill=True)
+    for new in (e for e in made["geom_inner"] if isinstance(e, bmesh.types.BMVert)):
+        new[VERTEX_ID] = -1
+    for a, b in rungs:
+        beside = [{e.other_vert(vertex(end)) for e in vertex(end).link_edges} for end in (a, b)]
+        (middle,) = (v for v in beside[0] & beside[1] if v[VERTEX_ID] == -1)
+        middle.co = vertex(a).co.lerp(vertex(b).co, slide)
+        name_new("vertex", middle)
+    for name, corner in quads:
+        (part,) = (f for f in bm.faces if f[FACE_ID] == name and vertex(corner) not in f.verts)
+        name_new("face", part)
+
+
+def face_inset(name: int, corners: tuple[int, ...]) -> None:
+    """A ring of quads inside a face; its middle keeps its number. The new vertices lie on the corners until moved."""
+    made = bmesh.ops.inset_individual(bm, faces=[face(name)], thickness=0.0)["faces"]
+    for quad in made:
+        quad[FACE_ID] = -1
+    inner = set(face(name).verts)
+    for new in inner:
+        new[VERTEX_ID] = -1
+    for corner in corners:
+        (new,) = inner.intersection(e.other_vert(vertex(corner)) for e in vertex(corner).link_edges)
+        name_new("vertex", new)
+    for a, b in zip(corners, (*corners[1:], corners[0]), strict=True):
+        (quad,) = (f for f in edge(a, b).link_faces if f in made)
+        name_new("face", quad)
+
+
 def face_split(name: int, a: int, b: int) -> None:
     """A face cut from corner a to corner b; the part that runs counter-clockwise from a to b is the new one."""
     new, _, _ = cut(face(name), vertex(a), vertex(b))

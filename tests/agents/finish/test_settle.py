@@ -36,7 +36,8 @@ def test_settle__puts_a_move_off_or_brings_it_forward_where_it_costs_nothing() -
     there_and_back = subdivided(({2: (0.8, 0.8)}, 0.6), ({2: (0.75, 0.75)}, 0.7))
     silhouette = painted(HOUSE)
     game = Simulator(silhouette, weights=ScoreWeights(w_locality=1e6))
-    settled = settle(there_and_back, game)
+    settled = settle(there_and_back.with_parts(["body", "leg"]), game)
+    assert settled.parts == ("body", "leg")
     assert Lesson.of(settled).moved == 0.0 and settled.final() == there_and_back.final()
     given = Simulator(silhouette, weights=ScoreWeights(w_locality=1e6), start=SQUARE)
     assert settle(subdivided(({2: (0.8, 0.8)}, 0.6)), given).start == SQUARE

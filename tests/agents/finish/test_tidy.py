@@ -60,6 +60,19 @@ def test_tidy__leaves_a_straight_construction_alone() -> None:
     assert tidy(gabled(), scored) == gabled()
 
 
+def test_tidy__keeps_the_parts_of_the_steps_that_stay() -> None:
+    cut, undone, lower = (
+        (SUBDIVIDE, {"edge": [0, 1]}, {}),
+        (DISSOLVE, {"vertex": 4}, {}),
+        (SUBDIVIDE, {"edge": [2, 3]}, {}),
+    )
+    tidied = tidy(
+        told(lower, cut, (DISSOLVE, {"vertex": 5}, {}), (SUBDIVIDE, {"edge": [0, 3]}, {})).with_parts("abcd"), scored
+    )
+    assert [(step.operator, step.part) for step in tidied.steps] == [(SUBDIVIDE, "a"), (SUBDIVIDE, "d")]
+    assert tidy(told(cut, undone).with_parts("ab"), scored).parts == ()
+
+
 def test_tidy__drops_a_vertex_that_comes_and_goes() -> None:
     sequence = told((SUBDIVIDE, {"edge": [0, 1]}, {}), (DISSOLVE, {"vertex": 4}, {}))
     assert tidy(sequence, scored) == sequence.trim(0)

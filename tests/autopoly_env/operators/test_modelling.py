@@ -128,3 +128,82 @@ def test_vertex_merge__leaves_some_boundary() -> None:
     corners = [(0, 0), (1, 0), (1, 1), (0, 1), (0.3, 0.3), (0.7, 0.3), (0.7, 0.7), (0.3, 0.7)]
     inset = PolyMesh.from_faces(corners, [(k, (k + 1) % 4, 4 + (k + 1) % 4, 4 + k) for k in range(4)] + [(4, 5, 6, 7)])
     assert "no boundary would be left" in refusal("vertex_merge", inset, 0, 2)
+
+
+def ring() -> PolyMesh:
+    """Eight quads around a hole."""
+    return apply("face_delete", grid(), 4)
+
+
+def test_loop_cut__runs_through_a_strip_from_rim_to_rim() -> None:
+    mesh = grid()
+    made = apply("loop_cut", mesh, edge(mesh, 5, 9), 0.25)  # upright: the strip is the middle row
+    assert np.subtract(made.counts, mesh.counts).tolist() == [4, 7, 3]
+    assert made.vertices[16:] == pytest.approx(np.array([(x / 3, 1.25 / 3) for x in range(4)]))
+    assert made.face_ids == (*range(9), 9, 10, 11)
+    assert made.faces[3] == (4, 5, 17, 16)  # with its first corner
+    assert made.faces[9] == (17, 9, 8, 16)
+    same = apply("loop_cut", mesh, edge(mesh, 7, 11), 0.25)
+    assert canonical_hash(same) == canonical_hash(made)
+
+
+@pytest.mark.parametrize("k", [1, 2, 5])
+def test_loop_cut__of_k_quads_adds_what_the_strip_has(k: int) -> None:
+    row = PolyMesh.from_faces(
+        [(x, y) for y in (0, 1) for x in range(k + 1)], [(i, i + 1, i + k + 2, i + k + 1) for i in range(k)]
+    )
+    made = apply("loop_cut", row, edge(row, 0, k + 1))
+    assert np.subtract(made.counts, row.counts).tolist() == [k + 1, 2 * k + 1, k]
+    assert made.vertices[2 * k + 2 :].tolist() == [[x, 0.5] for x in range(k + 1)]
+
+
+def test_loop_cut__goes_all_around_a_ring() -> None:
+    corners = [(0, 0), (3, 0), (3, 3), (0, 3), (1, 1), (2, 1), (2, 2), (1, 2)]
+    mesh = PolyMesh.from_faces(corners, [(k, (k + 1) % 4, 4 + (k + 1) % 4, 4 + k) for k in range(4)])
+    made = apply("loop_cut", mesh, edge(mesh, 2, 6), 0.5)
+    assert np.subtract(made.counts, mesh.counts).tolist() == [4, 8, 4]
+    assert sorted(made.vertices[8:].tolist()) == [[0.5, 0.5], [0.5, 2.5], [2.5, 0.5], [2.5, 2.5]]
+    assert (made.topology.n_holes, made.topology.n_components) == (1, 1)
+
+
+def test_loop_cut__ends_at_a_face_that_is_no_quad() -> None:
+    mesh = PolyMesh.from_faces([(0, 0), (1, 0), (1, 1), (0, 1), (2, 0.5)], [(0, 1, 2, 3), (1, 4, 2)])
+    made = apply("loop_cut", mesh, edge(mesh, 0, 3))
+    assert made.counts == (7, 9, 3)
+    assert made.faces[1] == (1, 4, 2, 6)
+
+
+def test_loop_cut__refuses_what_is_no_strip() -> None:
+    triangle = PolyMesh.from_faces([(0, 0), (1, 0), (0, 1)], [range(3)])
+    assert "no quad lies beside it" in refusal("loop_cut", triangle, 0)
+    assert legal("loop_cut", triangle) == []
+    for slide in (0.0, 1.0, -0.5, float("nan"), "half"):
+        assert "is no slide; give a number between 0 and 1" in refusal("loop_cut", quad(), 0, slide)
+    corners = [(0, 0), (3, 0), (3, 3), (0, 3), (1, 1), (2, 1), (2, 2), (1, 2)]
+    mesh = PolyMesh.from_faces(corners, [(k, (k + 1) % 4, 4 + (k + 1) % 4, 4 + k) for k in range(4)])
+    pentagon = apply("edge_subdivide", mesh, edge(mesh, 0, 1))  # instead of a quad of the ring
+    assert "both ends of its strip lie on one face" in refusal("loop_cut", pentagon, edge(pentagon, 2, 6))
+    corners = [(0.2, 0.2), (0.7, 0.2), (0.7, 0.7), (0.2, 0.7), (0.9, 0.2), (0.9, 0.7), (0.5, 1), (0.9, 0.8)]
+    curl = PolyMesh.from_faces(
+        corners, [(0, 1, 2, 3), (2, 1, 4, 5), (7, 5, 4, 6), (2, 5, 7, 6)]
+    )  # back to 2-5 of 2-1-4-5
+    assert "its strip of quads crosses itself" in refusal("loop_cut", curl, edge(curl, 0, 3))
+
+
+def test_face_inset__puts_a_ring_around_the_middle() -> None:
+    made = apply("face_inset", quad(), 0)
+    assert made.counts == (8, 12, 5)
+    assert made.faces == ((4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
+    assert made.vertices[4:].tolist() == [[0.25, 0.25], [0.75, 0.25], [0.75, 0.75], [0.25, 0.75]]
+    hole = apply("face_delete", made, 0)
+    assert np.subtract(hole.counts, quad().counts).tolist() == [4, 8, 3]
+    assert hole.topology.n_holes == 1
+
+
+def test_face_inset__refuses_a_face_that_is_not_convex() -> None:
+    dart = PolyMesh.from_faces([(0, 0), (1, 0.5), (0, 1), (0.25, 0.5)], [range(4)])
+    star = PolyMesh.from_faces([(0.5, 0), (0.8, 1), (0, 0.4), (1, 0.4), (0.2, 1)], [range(5)])  # turns twice
+    tiny = PolyMesh.rectangle(0, 0, 0.001, 0.001)
+    for mesh in (dart, star, tiny):
+        assert legal("face_inset", mesh) == []
+        assert "not convex or has no room" in refusal("face_inset", mesh, 0)

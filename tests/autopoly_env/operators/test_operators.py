@@ -356,7 +356,8 @@ def test_preset__takes_a_name_or_a_list() -> None:
     ]  # fmt: skip
     assert preset("full") == tuple(OPERATORS.values())[:7] == PRESETS["full"]
     assert [operator.name for operator in preset("modeller")] == [
-        "edge_extrude", "edge_cap", "edge_fill", "vertex_merge", "face_delete", "vertex_dissolve", "edge_dissolve",
+        "edge_extrude", "edge_cap", "edge_fill", "vertex_merge", "loop_cut", "face_inset",
+        "face_delete", "vertex_dissolve", "edge_dissolve",
     ]  # fmt: skip
     assert preset("face_hole, edge_extrude") == (OPERATORS["face_hole"], OPERATORS["edge_extrude"])
     assert preset(["paper", OPERATORS["face_hole"]]) == (*PRESETS["paper"], OPERATORS["face_hole"])
@@ -408,6 +409,13 @@ def expected_effect(transition: Transition) -> tuple[int, int, int]:
         return len(stay[0]) - mesh.counts[0], len(stay[1]) - mesh.counts[1], -1
     if name == "edge_fill":
         return 0, n_new_sides(mesh, transition.made.faces[-1]), 1
+    if name == "face_inset":
+        n = len(mesh.faces[element])
+        return n, 2 * n, n
+    if name == "loop_cut":
+        n, k = (len(transition.made.vertex_ids) - mesh.counts[0]), (len(transition.made.faces) - mesh.counts[2])
+        assert n in (k, k + 1)
+        return n, n + k, k
     if name == "vertex_merge":
         choice = OPERATORS[name].choose(mesh, element) if transition.choice is None else transition.choice
         ends = [{u for e in mesh.edges.tolist() for u in e if v in e and u != v} for v in (element, choice)]

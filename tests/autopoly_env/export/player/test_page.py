@@ -156,6 +156,9 @@ def test_words__name_elements_and_keys_of_every_operator() -> None:
     assert words.keys() == OPERATORS.keys()
     assert words["edge_fill"].done == "Edge 1–4 and edge 1–5 are joined by a new face, face 3. All vertices stay."
     assert words["vertex_merge"].done == "Vertex 9 is merged into vertex 6. All vertices stay."
+    cut = "An edge loop is cut through 2 quads, across edge 0–1, and adds 3 vertices. All vertices stay."
+    assert words["loop_cut"].done == cut
+    assert words["face_inset"].done == "Face 6 gets a ring of 4 quads around its middle. All vertices stay."
     assert words["edge_fill"].keys[0].endswith("click edge 1–4, `Shift` click edge 1–5")
     assert (
         words["edge_subdivide"].done == "Edge 0–1 gets vertex 4 in its middle. Then 1 vertex moves to fit the target."
@@ -164,7 +167,13 @@ def test_words__name_elements_and_keys_of_every_operator() -> None:
     assert words["edge_extrude"].keys[-1].startswith("`G`")
     assert words["face_delete"].done == "Face 3 is deleted. All vertices stay."
     keys = {"edge_subdivide": "Subdivide", "edge_extrude": "`E`", "face_split": "`J`", "face_delete": "`X` › Faces"}
-    keys |= {"edge_cap": "`M` › At Center", "edge_fill": "`F`", "vertex_merge": "`M` › At Last"}
+    keys |= {
+        "edge_cap": "`M` › At Center",
+        "edge_fill": "`F`",
+        "vertex_merge": "`M` › At Last",
+        "loop_cut": "`Ctrl` `R`",
+        "face_inset": "`I`",
+    }
     keys |= {"face_hole": "`K`", "vertex_dissolve": "`Ctrl` `X`", "edge_dissolve": "`X` › Dissolve Edges"}
     for operator, key in keys.items():
         assert key in " ".join(words[operator].keys)
