@@ -15,6 +15,7 @@ from agents.climb.decimate import DecimateAgent
 from agents.entry import AgentEntry, entry_of, outside_entry
 from agents.guided.agent import nfap_mcts, nfap_prior
 from agents.guided.config import NfapMctsConfig, NfapPriorConfig
+from agents.quads.agent import QuadsAgent
 from agents.rl.agent import PRIOR, rl_agent, rl_prior
 from agents.rl.config import RlConfig, RlPriorConfig
 from agents.search.config import PAPER, MctsConfig
@@ -87,6 +88,7 @@ register_agent("beam", BeamAgent)
 register_agent("trace", TraceAgent)
 register_agent("climb", ClimbAgent)
 register_agent("decimate", DecimateAgent)
+register_agent("quads", QuadsAgent)
 register_agent("mcts", _mcts, MctsConfig())
 register_agent("mcts_paper", _mcts_paper, PAPER)
 register_agent("nfap-prior", _nfap_prior, NfapPriorConfig())

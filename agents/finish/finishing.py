@@ -22,34 +22,41 @@ from autopoly_env.sequence.file import Score as PlainScore
 from autopoly_env.simulator import Simulator, State
 
 
-def finish(simulator: Simulator, states: Sequence[State], meter: Meter, *, keep_steps: bool = False) -> Solution:
+def finish(
+    simulator: Simulator, states: Sequence[State], meter: Meter, *, keep_steps: bool = False, keep_shape: bool = False
+) -> Solution:
     """The solution that `states` construct, the last mesh polished, scored at the silhouette's own resolution.
 
     What the shape does not need is taken away (`pare`), if the budget is not spent; the steps are told without detours
-    (`tidy`) and, where the weights ask for it, with fewer moves (`settle`); none of that if `keep_steps`. A start mesh
+    (`tidy`) and, where the weights ask for it, with fewer moves (`settle`); none of that if `keep_steps`. With
+    `keep_shape` the last mesh is not polished but stays as it is. A start mesh
     that nothing was done to stays as it is; a sequence that was gone on from comes before the new steps. A
     KeyboardInterrupt on the way is noted, and the work done nevertheless.
     """
     try:
-        return _finish(simulator, states, meter, keep_steps)
+        return _finish(simulator, states, meter, keep_steps, keep_shape)
     except KeyboardInterrupt:
         meter.stopped_by = "interrupted"
-        return _finish(simulator, states, meter, keep_steps)
+        return _finish(simulator, states, meter, keep_steps, keep_shape)
 
 
-def _finish(simulator: Simulator, states: Sequence[State], meter: Meter, keep_steps: bool) -> Solution:
+def _finish(
+    simulator: Simulator, states: Sequence[State], meter: Meter, keep_steps: bool, keep_shape: bool
+) -> Solution:
     versions = [states]
     if not (keep_steps or meter.stopped_by == "interrupted" or meter.spent()):
         pared, n_refits, n_taken = pare(simulator, states)
         meter.add_refits(n_refits)
         versions += [pared] if n_taken else []
-    solutions = [_told(simulator, version, meter, keep_steps) for version in versions]
+    solutions = [_told(simulator, version, meter, keep_steps, keep_shape) for version in versions]
     return max(solutions, key=lambda solution: solution.score.total)
 
 
-def _told(simulator: Simulator, states: Sequence[State], meter: Meter, keep_steps: bool) -> Solution:
+def _told(
+    simulator: Simulator, states: Sequence[State], meter: Meter, keep_steps: bool, keep_shape: bool
+) -> Solution:
     meshes = [state.mesh for state in states]
-    if len(meshes) > 1 or simulator.guidance.start is None:
+    if not keep_shape and (len(meshes) > 1 or simulator.guidance.start is None):
         meshes[-1] = _polished(simulator, meshes)
     scores = [simulator.final_score(mesh) for mesh in meshes]
     docked = [0.0, *(simulator.docked(*pair) for pair in pairwise(meshes))]

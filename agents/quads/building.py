@@ -1,12 +1,15 @@
 """A mesh of quads and triangles as a construction: every face made in its turn, every vertex at once in its place."""
 
+import numpy as np
+
 from agents.quads.telling import Addition, order_of
 from agents.trace.construct import Builder, UnbuildableError, grow_quad
 from autopoly_env.arrays import FloatArray
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.simulator import Simulator, State
 
-OPERATORS = ("edge_extrude", "edge_cap", "edge_fill", "vertex_merge", "face_delete")  # that the telling may need
+OPERATORS = ("edge_extrude", "edge_cap", "edge_fill", "vertex_merge", "face_delete", "vertex_dissolve")  # that the telling may need
+_BULGE = 0.05  # of its length, that a side of a triangle stands out while it has a corner in it
 _SHY = 0.2  # share of the way to the middle of its face by which a corner stays away from the one it is welded to
 
 
@@ -59,7 +62,12 @@ def _shy(points: FloatArray, addition: Addition, v: int) -> FloatArray:
 
 
 def _begin_part(builder: Builder, points: FloatArray, addition: Addition) -> dict[int, int]:
-    """A quad of its own."""
-    if len(addition.face) != 4:
-        raise UnbuildableError("a part of its own begins with a quad")
-    return dict(zip(addition.face, grow_quad(builder, points[list(addition.face)]), strict=True))
+    """A quad or a triangle of its own; a triangle is a quad one of whose corners is dissolved."""
+    corners = points[list(addition.face)]
+    if len(corners) == 4:
+        return dict(zip(addition.face, grow_quad(builder, corners), strict=True))
+    (ax, ay), (bx, by) = corners[:2].tolist()
+    bulge = (0.5 * (ax + bx) + _BULGE * (by - ay), 0.5 * (ay + by) - _BULGE * (bx - ax))
+    ids = grow_quad(builder, np.insert(corners, 1, bulge, axis=0))
+    builder.do("vertex_dissolve", builder.mesh.vertex_index(ids.pop(1)))
+    return dict(zip(addition.face, ids, strict=True))

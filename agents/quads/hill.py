@@ -10,11 +10,13 @@ from agents.quads.partition import MOST_BENT, Partition, bent, least_faces, mesh
 from agents.trace.outline import Outline
 from agents.trace.rings import trace_rings
 from autopoly_env.compute import map_threads
-from autopoly_env.refit import RefitConfig
+from autopoly_env.mesh import PolyMesh, is_sane
+from autopoly_env.refit import LOCAL, RefitConfig, refit, tune
 from autopoly_env.score import Score, intersection_over_union
 from autopoly_env.simulator import Simulator
 
 _UNCUT = 50.0  # points of r_all that an outline loses which cannot be cut
+_N_REFINED = 3  # refits at the finest resolution, at most
 _TRIANGLE = 0.5  # elements that a triangle is thought to cost beside its own
 
 
@@ -85,9 +87,28 @@ class QuadHill:
         worth = map_threads(self.promise, found)
         return [found[k] for k in np.argsort(-np.array(worth), kind="stable").tolist()]
 
+    def polished(self, place: QuadPlace) -> list[PolyMesh]:
+        """The mesh of a place, refitted and tuned under the rule at the finest resolution; none if it has defects."""
+        assert place.partition is not None
+        mesh = mesh_of(place.outline, place.partition)
+        return [polished(self.simulator, mesh)] if is_sane(mesh, "quads") else []
+
     def shaken(self, place: QuadPlace, rng: np.random.Generator) -> Outline:
         """An outline a few random moves away."""
         return quad_shaken(place.outline, self.simulator.silhouette, rng)
+
+
+def polished(simulator: Simulator, mesh: PolyMesh) -> PolyMesh:
+    """The mesh refitted and tuned under the rule at the silhouette's own resolution: no worse than it was."""
+    best, score = mesh, simulator.final_score(mesh)
+    for _ in range(_N_REFINED):
+        fitted = refit(best, simulator.refit_target(score.iou, simulator.finest), LOCAL, faces="quads").mesh
+        fitted_score = simulator.final_score(fitted)
+        if not fitted_score.total > score.total:
+            break
+        best, score = fitted, fitted_score
+    tuned = tune(best, simulator.silhouette.target(simulator.finest), faces="quads")
+    return max((best, tuned), key=lambda candidate: simulator.final_score(candidate).total)
 
 
 def complexity_of(outline: Outline, n_faces: int) -> int:

@@ -1,7 +1,7 @@
 """Search among outlines that are cut into quads: climbs from traced outlines, then hops from top to top."""
 
 from collections.abc import Iterator
-from itertools import chain
+from itertools import islice
 
 import numpy as np
 
@@ -9,12 +9,15 @@ from agents.budget import Meter
 from agents.climb.coarsened import variants
 from agents.quads.hill import QuadHill, QuadPlace, total_of
 from agents.trace.agent import TraceAgent, TraceConfig
-from agents.trace.outline import Outline
 from agents.trace.rings import trace_rings
 from autopoly_env.refit import LOCAL, THOROUGH
 
 _PRICES = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 6.0)  # of a vertex, of what it costs without inner edges
-_N_SEEDS = 5  # of traced outlines
+_N_SEEDS = 8  # of traced outlines
+_N_FIRST = 4  # of them that are climbed from before anything else
+_SEED_EVERY = 3  # hops, another one
+_LOOK_EVERY = 10  # hops, all neighbours of the best top are tried
+_N_AT_ONCE = 6  # of the neighbours
 _N_TRIED = 16  # neighbours that are refitted before it is seen whether one is better
 _N_BLAMED = 6
 _N_THOROUGH = 4
@@ -28,27 +31,27 @@ _LEAST_GAIN = 1e-9
 def explore(hill: QuadHill, patience: int, rng: np.random.Generator, meter: Meter) -> Iterator[QuadPlace]:
     """Places worth keeping, until `patience` hops in a row found no better one."""
     price = max(hill.simulator.weights.w_sc, _LEAST_PRICE)
+    seeds = _seeds(hill, meter)
     arms: list[QuadPlace] = []
-    for seed in _seeds(hill, meter):
-        for place in climb(hill, seed, meter):
-            if meter.spent():
-                break
-        arms.append(place)
-        yield place
-        if meter.spent():
-            return
-    best, n_tried, failures = max(map(total_of, arms), default=float("-inf")), [0] * len(arms), 0
+    for seed in islice(seeds, _N_FIRST):
+        arms.append(climbed(hill, seed, meter))
+        yield arms[-1]
+    best, n_tried, failures, n_hops = max(map(total_of, arms), default=float("-inf")), [0] * len(arms), 0, 0
     looked: set[float] = set()
     while arms and failures < patience and not meter.spent():
-        k = max(range(len(arms)), key=lambda k: arms[k].total - _FATIGUE * price * n_tried[k])
-        n_tried[k] += 1
+        n_hops += 1
         failures += 1
-        if failures % 20 == 0:
-            top = max((arm for arm in arms if arm.total not in looked), key=total_of, default=None)
-            if top is not None:
-                looked.add(top.total)
-                top = _looked_around(hill, top, meter)
+        seed = next(seeds, None) if n_hops % _SEED_EVERY == 0 else None
+        unlooked = [arm for arm in arms if arm.total not in looked]
+        if seed is not None:
+            top: QuadPlace | None = climbed(hill, seed, meter)
+        elif n_hops % _LOOK_EVERY == 0 and unlooked:
+            chosen = max(unlooked, key=total_of)
+            looked.add(chosen.total)
+            top = _looked_around(hill, chosen, meter)
         else:
+            k = max(range(len(arms)), key=lambda k: arms[k].total - _FATIGUE * price * n_tried[k])
+            n_tried[k] += 1
             top = _hop_from(hill, arms[k], _HOPELESS * price, rng, meter)
         if top is None or any(abs(top.total - arm.total) < _SAME for arm in arms):
             continue
@@ -59,18 +62,20 @@ def explore(hill: QuadHill, patience: int, rng: np.random.Generator, meter: Mete
             best, failures = top.total, 0
 
 
-def climb(hill: QuadHill, place: QuadPlace, meter: Meter) -> Iterator[QuadPlace]:
-    """Move to the best of the most promising neighbours while one is better; yield every place on the way."""
-    yield place
+def climbed(hill: QuadHill, place: QuadPlace, meter: Meter) -> QuadPlace:
+    """The place above, by moving to the best of a few promising neighbours while one is better."""
     while not meter.spent():
-        outlines = meter.affordable(hill.neighbours(place, _N_BLAMED)[:_N_TRIED])
-        places = hill.fit(outlines, LOCAL, place.score.iou)
-        best = max(places, key=total_of, default=place)
-        meter.count(len(places), max(best.total, place.total))
+        outlines, best = hill.neighbours(place, _N_BLAMED)[:_N_TRIED], place
+        for first in range(0, len(outlines), _N_AT_ONCE):
+            places = hill.fit(meter.affordable(outlines[first : first + _N_AT_ONCE]), LOCAL, place.score.iou)
+            best = max([place, *places], key=total_of)
+            meter.count(len(places), best.total)
+            if best.total > place.total + _LEAST_GAIN or meter.spent():
+                break
         if best.total <= place.total + _LEAST_GAIN:
-            return
+            break
         place = best
-        yield place
+    return place
 
 
 def _looked_around(hill: QuadHill, place: QuadPlace, meter: Meter) -> QuadPlace | None:
@@ -83,7 +88,7 @@ def _looked_around(hill: QuadHill, place: QuadPlace, meter: Meter) -> QuadPlace 
     best = max(places, key=total_of)
     if best.total <= place.total + _LEAST_GAIN:
         return None
-    return list(climb(hill, best, meter))[-1]
+    return climbed(hill, best, meter)
 
 
 def _hop_from(
@@ -95,7 +100,7 @@ def _hop_from(
     meter.count(1, place.total)
     if place.total <= top.total - most_lost:
         return None
-    return list(climb(hill, place, meter))[-1]
+    return climbed(hill, place, meter)
 
 
 def _seeds(hill: QuadHill, meter: Meter) -> Iterator[QuadPlace]:

@@ -1,0 +1,94 @@
+"""`quads`: a mesh of convex quads and few triangles, modelled from the main body outwards.
+
+Outlines are searched at the price that their vertices have once they are cut into quads (`search`), cut (`partition`),
+refitted under the rule of faces, and told in the order of modelling (`telling`).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from agents.base import WholeAgent
+from agents.budget import Budget, Meter
+from agents.finish import finish
+from agents.quads.building import OPERATORS, build
+from agents.quads.hill import QuadHill, QuadPlace, total_of
+from agents.quads.partition import mesh_of
+from agents.quads.search import explore
+from agents.solution import Solution
+from agents.trace.construct import UnbuildableError
+from autopoly_env.compute import map_threads
+from autopoly_env.errors import ConfigError
+from autopoly_env.mesh import PolyMesh
+from autopoly_env.simulator import Simulator, State
+
+_SHARE = 0.9  # of a limit of seconds, that the search uses; the rest is for what follows
+
+
+@dataclass(frozen=True)
+class QuadsConfig:
+    """How `quads` searches."""
+
+    patience: int = 120  # hops in a row, from outline to outline, that may fail to find a better one
+    n_polished: int = 8  # of the best outlines, that are refitted at the silhouette's own resolution
+    n_refits: int = 1500  # where the budget sets no limit
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name, least in {"patience": 0, "n_polished": 1, "n_refits": 1, "seed": 0}.items():
+            if getattr(self, name) < least:
+                raise ConfigError(f"{name} = {getattr(self, name)}: expected at least {least}")
+
+
+class QuadsAgent(WholeAgent):
+    """Searches outlines as meshes of quads, and builds the best."""
+
+    name = "quads"
+    config_class = QuadsConfig
+
+    def __init__(self, config: QuadsConfig) -> None:
+        self._config = config
+
+    def _find(self, simulator: Simulator, meter: Meter) -> Solution:
+        check_operators(simulator)
+        if meter.rest() == Budget():
+            meter = meter.limited(Budget(self._config.n_refits))
+        hill = QuadHill(simulator)
+        places: list[QuadPlace] = []
+        try:
+            rng = np.random.default_rng(self._config.seed)
+            for place in explore(hill, self._config.patience, rng, meter):
+                places.append(place)
+        except KeyboardInterrupt:
+            meter.stopped_by = "interrupted"
+        states = best_build(hill, places, self._config.n_polished)
+        if not states:
+            return finish(simulator, [simulator.initial()], meter, keep_steps=True)
+        return finish(simulator, states, meter, keep_steps=True, keep_shape=True)
+
+
+def check_operators(simulator: Simulator) -> None:
+    """Raise ConfigError for a simulator in which quads cannot be told."""
+    missing = [name for name in OPERATORS if name not in simulator.operators]
+    if missing:
+        raise ConfigError(
+            f"quads builds with {', '.join(OPERATORS)}, and {missing[0]} is not among the operators: "
+            "give the preset modeller"
+        )
+
+
+def best_build(hill: QuadHill, places: Sequence[QuadPlace], n_polished: int) -> list[State]:
+    """The construction of the best place that can be built, after the best ones were polished; empty if none can."""
+    distinct = {place.total: place for place in places if place.partition is not None}
+    best = sorted(distinct.values(), key=total_of, reverse=True)[:n_polished]
+    meshes: list[PolyMesh] = [mesh for found in map_threads(hill.polished, best) for mesh in found]
+    totals = {id(mesh): hill.simulator.final_score(mesh).total for mesh in meshes}
+    for mesh in sorted(meshes, key=lambda mesh: -totals[id(mesh)]):
+        try:
+            states = build(hill.simulator, mesh)
+        except UnbuildableError:
+            continue
+        if states[-1].step <= hill.simulator.max_steps:
+            return states
+    return []
