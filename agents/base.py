@@ -31,6 +31,10 @@ class Agent(ABC):
     takes_guidance = True  # a start mesh, locked vertices and symmetry, which the transitions it plays keep to
     takes_faces = True  # a rule of faces, which these transitions keep as well
 
+    def suits(self, simulator: Simulator) -> bool:
+        """Whether it can solve what the simulator asks for, its guidance, rule of faces and operators."""
+        return (self.takes_guidance or not simulator.guidance.names) and (self.takes_faces or simulator.faces == "any")
+
     @abstractmethod
     def act(self, simulator: Simulator, state: State) -> Decision:
         """Choose the next action in `state`."""

@@ -52,9 +52,7 @@ def _finish(
     return max(solutions, key=lambda solution: solution.score.total)
 
 
-def _told(
-    simulator: Simulator, states: Sequence[State], meter: Meter, keep_steps: bool, keep_shape: bool
-) -> Solution:
+def _told(simulator: Simulator, states: Sequence[State], meter: Meter, keep_steps: bool, keep_shape: bool) -> Solution:
     meshes = [state.mesh for state in states]
     if not keep_shape and (len(meshes) > 1 or simulator.guidance.start is None):
         meshes[-1] = _polished(simulator, meshes)

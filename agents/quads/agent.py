@@ -14,16 +14,12 @@ from agents.budget import Budget, Meter
 from agents.finish import finish
 from agents.quads.building import OPERATORS, build
 from agents.quads.hill import QuadHill, QuadPlace, total_of
-from agents.quads.partition import mesh_of
 from agents.quads.search import explore
 from agents.solution import Solution
 from agents.trace.construct import UnbuildableError
 from autopoly_env.compute import map_threads
 from autopoly_env.errors import ConfigError
-from autopoly_env.mesh import PolyMesh
 from autopoly_env.simulator import Simulator, State
-
-_SHARE = 0.9  # of a limit of seconds, that the search uses; the rest is for what follows
 
 
 @dataclass(frozen=True)
@@ -45,10 +41,14 @@ class QuadsAgent(WholeAgent):
     """Searches outlines as meshes of quads, and builds the best."""
 
     name = "quads"
+    takes_faces = True
     config_class = QuadsConfig
 
     def __init__(self, config: QuadsConfig) -> None:
         self._config = config
+
+    def suits(self, simulator: Simulator) -> bool:
+        return super().suits(simulator) and not _missing(simulator)
 
     def _find(self, simulator: Simulator, meter: Meter) -> Solution:
         check_operators(simulator)
@@ -70,7 +70,7 @@ class QuadsAgent(WholeAgent):
 
 def check_operators(simulator: Simulator) -> None:
     """Raise ConfigError for a simulator in which quads cannot be told."""
-    missing = [name for name in OPERATORS if name not in simulator.operators]
+    missing = _missing(simulator)
     if missing:
         raise ConfigError(
             f"quads builds with {', '.join(OPERATORS)}, and {missing[0]} is not among the operators: "
@@ -78,17 +78,26 @@ def check_operators(simulator: Simulator) -> None:
         )
 
 
+def _missing(simulator: Simulator) -> list[str]:
+    return [name for name in OPERATORS if name not in simulator.operators]
+
+
 def best_build(hill: QuadHill, places: Sequence[QuadPlace], n_polished: int) -> list[State]:
-    """The construction of the best place that can be built, after the best ones were polished; empty if none can."""
+    """The construction of the best places, polished, that is worth most within the step limit; empty if none can be."""
     distinct = {place.total: place for place in places if place.partition is not None}
     best = sorted(distinct.values(), key=total_of, reverse=True)[:n_polished]
-    meshes: list[PolyMesh] = [mesh for found in map_threads(hill.polished, best) for mesh in found]
-    totals = {id(mesh): hill.simulator.final_score(mesh).total for mesh in meshes}
-    for mesh in sorted(meshes, key=lambda mesh: -totals[id(mesh)]):
+    meshes = [mesh for found in map_threads(hill.polished, best) for mesh in found]
+    worth = [hill.simulator.final_score(mesh).total for mesh in meshes]
+    chosen: list[State] = []
+    most = float("-inf")
+    for k in sorted(range(len(meshes)), key=lambda k: -worth[k]):
+        if worth[k] <= most:
+            break
         try:
-            states = build(hill.simulator, mesh)
+            states = build(hill.simulator, meshes[k])[: hill.simulator.max_steps + 1]
         except UnbuildableError:
             continue
-        if states[-1].step <= hill.simulator.max_steps:
-            return states
-    return []
+        total = max(hill.simulator.final_score(state.mesh).total for state in states)
+        if total > most:
+            chosen, most = states, total
+    return chosen

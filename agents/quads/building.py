@@ -8,7 +8,14 @@ from autopoly_env.arrays import FloatArray
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.simulator import Simulator, State
 
-OPERATORS = ("edge_extrude", "edge_cap", "edge_fill", "vertex_merge", "face_delete", "vertex_dissolve")  # that the telling may need
+OPERATORS = (
+    "edge_extrude",
+    "edge_cap",
+    "edge_fill",
+    "vertex_merge",
+    "face_delete",
+    "vertex_dissolve",
+)  # that the telling may need
 _BULGE = 0.05  # of its length, that a side of a triangle stands out while it has a corner in it
 _SHY = 0.2  # share of the way to the middle of its face by which a corner stays away from the one it is welded to
 

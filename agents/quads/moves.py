@@ -13,8 +13,11 @@ from agents.climb.moves import CLUMSY_BLAME, JITTER, blamed_rows, grown_at
 from agents.quads.partition import Partition, partitioned
 from agents.trace.outline import Outline
 from agents.trace.rings import Ring
+from autopoly_env.arrays import FloatArray
 from autopoly_env.placement import Disagreement
 from autopoly_env.silhouette import Silhouette
+
+_Side = tuple[int, int]  # vertices of an outline, as a face or a ring runs
 
 
 def without(outline: Outline, vertices: set[int]) -> Outline | None:
@@ -83,45 +86,57 @@ def _rungs_more(outline: Outline, partition: Partition, silhouette: Silhouette, 
     """A vertex where an edge is to blame, and one across the quad or the strip of quads behind it."""
     loops = outline.loops
     disagreement = Disagreement(loops, silhouette)
-    opposite = {}
+    opposite = _opposite_sides(partition)
+    rim = [(a, b) for a, b in loops.topology.boundary_half_edges.tolist()]
+    for row in blamed_rows(disagreement, n_blamed):
+        a, b = rim[row]
+        new = _added(outline, grown_at(outline, disagreement, row, "edge_subdivide"))
+        across = _other_end_of_strip(opposite, set(rim), (a, b))
+        if across is not None:
+            c, d = across
+            share = _share_along(new, loops.vertices[a], loops.vertices[b])
+            yield _with_points(
+                outline, {(a, b): new, (c, d): loops.vertices[d] + share * (loops.vertices[c] - loops.vertices[d])}
+            )
+
+
+def _opposite_sides(partition: Partition) -> dict[_Side, _Side]:
+    """Across every side of a quad, as the quad runs, the other side."""
+    opposite: dict[_Side, _Side] = {}
     for face in partition.faces:
         if len(face) == 4:
             a, b, c, d = face
             opposite |= {(a, b): (c, d), (b, c): (d, a), (c, d): (a, b), (d, a): (b, c)}
-    sides = {pair: row for row, pair in enumerate(map(tuple, loops.topology.boundary_half_edges.tolist()))}
-    for row in blamed_rows(disagreement, n_blamed):
-        a, b = loops.topology.boundary_half_edges[row].tolist()
-        grown = grown_at(outline, disagreement, row, "edge_subdivide")
-        new = _added(outline, grown)
-        share = _share_along(new, loops.vertices[a], loops.vertices[b])
-        at, seen = (a, b), {(a, b)}
-        while at in opposite:
-            c, d = opposite[at]
-            if (c, d) in sides:
-                points = {(a, b): new, (c, d): loops.vertices[d] + share * (loops.vertices[c] - loops.vertices[d])}
-                yield _with_points(outline, points)
-                break
-            at = (d, c)
-            if at in seen:
-                break
-            seen.add(at)
+    return opposite
 
 
-def _added(outline: Outline, grown: Outline) -> np.ndarray:
-    for old, new in zip(outline.rings, grown.rings, strict=True):
-        if len(new.points) > len(old.points):
-            known = {tuple(p) for p in old.points.tolist()}
-            return next(p for p in new.points if tuple(p.tolist()) not in known)
-    raise AssertionError
+def _other_end_of_strip(opposite: dict[_Side, _Side], rim: set[_Side], side: _Side) -> _Side | None:
+    """The boundary edge at the other end of the strip of quads that begins at one; None where a triangle ends it."""
+    seen = set()
+    while side in opposite and side not in seen:
+        seen.add(side)
+        c, d = opposite[side]
+        if (c, d) in rim:
+            return c, d
+        side = (d, c)
+    return None
 
 
-def _share_along(point: np.ndarray, a: np.ndarray, b: np.ndarray) -> float:
+def _added(outline: Outline, grown: Outline) -> FloatArray:
+    """The point that the second of two outlines has more than the first."""
+    known = {tuple(point) for point in outline.loops.vertices.tolist()}
+    [point] = [point for point in grown.loops.vertices if tuple(point.tolist()) not in known][:1]
+    found: FloatArray = point
+    return found
+
+
+def _share_along(point: FloatArray, a: FloatArray, b: FloatArray) -> float:
     along = b - a
     length2 = float(along @ along)
     return float(np.clip((point - a) @ along / length2, 0.1, 0.9)) if length2 else 0.5
 
 
-def _with_points(outline: Outline, points: dict[tuple[int, int], np.ndarray]) -> Outline:
+def _with_points(outline: Outline, points: dict[_Side, FloatArray]) -> Outline:
     """The outline with a vertex more in each of some boundary edges."""
     rings, first = [], 0
     for ring in outline.rings:

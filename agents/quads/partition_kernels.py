@@ -8,7 +8,7 @@ import numpy as np
 
 from autopoly_env.arrays import BoolArray, FloatArray, IntArray
 from autopoly_env.compute import kernel
-from autopoly_env.mesh.planar_kernels import cross, enters_cone, segments_touch
+from autopoly_env.mesh.planar_kernels import enters_cone, segments_touch
 
 UGLINESS = 0.1  # what the worst corner of a face costs at most, in elements
 BENDING = 2.0  # what it costs for each unit of sine that a corner has to be bent to be allowed

@@ -41,10 +41,11 @@ def explore(hill: QuadHill, patience: int, rng: np.random.Generator, meter: Mete
     while arms and failures < patience and not meter.spent():
         n_hops += 1
         failures += 1
-        seed = next(seeds, None) if n_hops % _SEED_EVERY == 0 else None
+        another = next(seeds, None) if n_hops % _SEED_EVERY == 0 else None
         unlooked = [arm for arm in arms if arm.total not in looked]
-        if seed is not None:
-            top: QuadPlace | None = climbed(hill, seed, meter)
+        top: QuadPlace | None
+        if another is not None:
+            top = climbed(hill, another, meter)
         elif n_hops % _LOOK_EVERY == 0 and unlooked:
             chosen = max(unlooked, key=total_of)
             looked.add(chosen.total)

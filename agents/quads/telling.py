@@ -1,15 +1,13 @@
 """In which order a mesh of quads and triangles is modelled, and with which operators.
 
-It begins with the largest face. Every further face hangs on an edge that is there already: a new quad is an extrusion, a
-new triangle a cap; a face whose corners are all there closes a ring and is filled in. Branches are followed to their end
-before the next one begins, and rings are closed last, so that whoever follows never goes back.
+It begins with the largest face. Every further face hangs on an edge that is there already: a new quad is an extrusion,
+a new triangle a cap; a face whose corners are all there closes a ring and is filled in. Branches are followed to their
+end before the next one begins, and rings are closed last, so that whoever follows never goes back.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-
-import numpy as np
 
 from autopoly_env.arrays import FloatArray
 from autopoly_env.mesh import Face, PolyMesh
@@ -41,9 +39,7 @@ def order_of(mesh: PolyMesh) -> Iterator[Addition]:
         n_parts += 1
 
 
-def _outwards(
-    mesh: PolyMesh, start: int, areas: FloatArray, waiting: set[int], first_part: int
-) -> Iterator[Addition]:
+def _outwards(mesh: PolyMesh, start: int, areas: FloatArray, waiting: set[int], first_part: int) -> Iterator[Addition]:
     """The faces that hang together with `start`, taken out of `waiting`."""
     sides = {pair: f for f, face in enumerate(mesh.faces) for pair in pairwise((*face, face[0]))}
     built_edges: set[tuple[int, int]] = set()  # as the built faces run
@@ -81,9 +77,7 @@ def _outwards(
 _RANK = {"extrude": 0, "cap": 0, "fill": 1, "weld": 2}
 
 
-def _kind(
-    face: Face, base: tuple[int, int], built_edges: set[tuple[int, int]], built_vertices: set[int]
-) -> str:
+def _kind(face: Face, base: tuple[int, int], built_edges: set[tuple[int, int]], built_vertices: set[int]) -> str:
     """What makes a face that hangs on the edge `base` of its own."""
     others = [v for v in face if v not in base and v in built_vertices]
     if not others:
@@ -104,5 +98,3 @@ def _turned(face: Face, a: int, b: int) -> Face:
     turned = (*face[k:], *face[:k])
     assert turned[1] == b
     return turned
-
-

@@ -20,14 +20,12 @@ _MOST_AT_ONCE = 2  # steps of a sequence that are one of the simulator's: an act
 def play(agents: Sequence[Agent], simulator: Simulator, meter: Meter) -> Iterator[Solution]:
     """The agents' solutions, as far as the budget goes. Raises KeyboardInterrupt after one that was interrupted.
 
-    Agents that cannot take the simulator's guidance, or keep its rule of faces, are left out.
+    Agents that do not suit the simulator, by its guidance, rule of faces or operators, are left out.
     """
     for agent in agents:
         if meter.spent():
             return
-        if simulator.guidance.names and not agent.takes_guidance:
-            continue
-        if simulator.faces != "any" and not agent.takes_faces:
+        if not agent.suits(simulator):
             continue
         solution = _solve_within(agent, simulator, meter)
         yield solution

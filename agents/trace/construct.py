@@ -29,7 +29,7 @@ class Builder:
     """The states of a construction in the making. Raises UnbuildableError for a start mesh that crosses itself."""
 
     def __init__(self, simulator: Simulator, start: PolyMesh) -> None:
-        if not is_sane(start):
+        if not is_sane(start, simulator.faces):
             raise UnbuildableError("the main outline crosses itself")
         self.simulator = simulator
         self.states = [State(start, simulator.score(start), n_refits=0)]
@@ -48,7 +48,7 @@ class Builder:
         for vertex_id, position in moves.items():
             vertices[made.vertex_index(vertex_id)] = position
         moved = made.with_vertices(vertices)
-        return moved if is_sane(moved) else None
+        return moved if is_sane(moved, self.simulator.faces) else None
 
     def do(
         self, name: str, element: int, choice: Choice | None = None, moves: dict[int, FloatArray] | None = None

@@ -20,6 +20,7 @@ from tests.helpers.networks import saved_networks, saved_policy
 from tests.helpers.solving import TARGETS, assert_consistent, quick, simulator
 
 POLICIES = ("ppo", "maskable-ppo", "a2c", "dqn")
+AT_HOME = {"quads": ("modeller",)}  # operators that an agent needs
 WITH_NETWORKS = ("nfap-prior", "nfap-mcts", "rl-prior", *POLICIES)
 
 
@@ -38,8 +39,15 @@ def options(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any
     }
 
 
-@pytest.mark.parametrize("operators", ["full", "paper"])
-@pytest.mark.parametrize("name", [name for name in AGENTS if name not in WITH_NETWORKS])
+@pytest.mark.parametrize(
+    ("name", "operators"),
+    [
+        (name, operators)
+        for name in AGENTS
+        for operators in AT_HOME.get(name, ("full", "paper"))
+        if name not in WITH_NETWORKS
+    ],
+)
 def test_agent__conforms(name: str, operators: str) -> None:
     options = {"mcts": {"n_simulations": 2, "hop_patience": 1}}.get(name, {})
     agent, other = (quick(name, **options) for _ in range(2))

@@ -15,7 +15,7 @@ from autopoly_env.operators import Action, legal_actions
 from autopoly_env.simulator import Simulator, State
 
 PLAYERS = ("greedy", "beam", "random", "mcts")
-WHOLE = ("trace", "climb", "decimate", "dr-simple", "dr-complex")
+WHOLE = ("trace", "climb", "decimate", "quads", "dr-simple", "dr-complex")
 OPTIONS: dict[str, dict[str, Any]] = {
     "beam": {"width": 2, "patience": 2},
     "random": {"n_steps": 8},

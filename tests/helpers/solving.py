@@ -30,6 +30,7 @@ QUICK: dict[str, dict[str, Any]] = {
     "beam": {"width": 2, "patience": 2},
     "random": {"n_steps": 8},
     "climb": {"n_rounds": 1},
+    "quads": {"patience": 3, "n_polished": 2, "n_refits": 60},
     "mcts": {"seeds": (), "n_simulations": 4, "patience": 1},
     "mcts_paper": {"n_simulations": 4, "patience": 1, "n_rollout": 1},
     "oracle": {"width": 2, "patience": 1},
