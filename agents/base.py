@@ -31,9 +31,18 @@ class Agent(ABC):
     takes_guidance = True  # a start mesh, locked vertices and symmetry, which the transitions it plays keep to
     takes_faces = True  # a rule of faces, which these transitions keep as well
 
+    def check(self, simulator: Simulator) -> None:
+        """Raise ConfigError if it cannot take what the simulator asks for: its guidance, rule of faces, operators."""
+        check_guidance(self, simulator.guidance.names)
+        check_faces(self, simulator)
+
     def suits(self, simulator: Simulator) -> bool:
-        """Whether it can solve what the simulator asks for, its guidance, rule of faces and operators."""
-        return (self.takes_guidance or not simulator.guidance.names) and (self.takes_faces or simulator.faces == "any")
+        """Whether `check` finds nothing."""
+        try:
+            self.check(simulator)
+        except ConfigError:
+            return False
+        return True
 
     @abstractmethod
     def act(self, simulator: Simulator, state: State) -> Decision:
@@ -93,9 +102,8 @@ class WholeAgent(Agent):
         budget: Budget | None = None,
         on_progress: Callable[[Progress], None] | None = None,
     ) -> Solution:
-        """As every agent. Raises ConfigError where it cannot take the simulator's guidance or rule of faces."""
-        check_guidance(self, simulator.guidance.names)
-        check_faces(self, simulator)
+        """As every agent. Raises ConfigError as `check` does."""
+        self.check(simulator)
         return self._find(simulator, Meter(budget or Budget(), on_progress))
 
     @abstractmethod

@@ -9,10 +9,9 @@ from typing import Annotated, Any
 import typer
 
 from agents.commands.running import FAILURE, complain, run_command
+from agents.commands.styles import DEFAULT_STYLE, describe_styles, style_named
 from agents.names import AGENT_NAMES
 from autopoly_env.errors import AutoPolyError
-
-DEFAULT_AGENT = "mcts"
 
 HELP = """Build a polygon mesh of every silhouette and tell how, action by action.
 
@@ -23,6 +22,7 @@ Examples:
   python -m agents.solve chair.png --agent beam --option width=4 --refits 5000
   python -m agents.solve chair.png --agent my.module:MyAgent
   python -m agents.solve 'shapes/**/*.png' --json --quiet > scores.jsonl
+  python -m agents.solve mug.png --style modeller
   python -m agents.solve mug.png --agent beam --faces quads
   python -m agents.solve mug.png --importance face.png
   python -m agents.solve mug.png --agent beam --start mug.obj --lock 0,3
@@ -64,17 +64,31 @@ def solve(
     images: Annotated[
         list[str], typer.Argument(metavar="IMAGE", help="Files, folders or patterns; ** crosses folders.")
     ],
-    agent: Annotated[
+    style: Annotated[
         str,
         typer.Option(
-            help=f"Who builds: {', '.join(AGENT_NAMES)}, my.module:Agent for one of yours, or a YAML "
-            "file of options that is named after its agent (docs/agents.md)."
+            help=f"What the next three are by default: {describe_styles()} (docs/modelling.md).", show_default=True
         ),
-    ] = DEFAULT_AGENT,
+    ] = DEFAULT_STYLE,
+    agent: Annotated[
+        str | None,
+        typer.Option(
+            help=f"Who builds: {', '.join(AGENT_NAMES)}, my.module:Agent for one of yours, or a YAML "
+            "file of options that is named after its agent (docs/agents.md).",
+            show_default="the style's",
+        ),
+    ] = None,
     operators: Annotated[
-        str, typer.Option(help="paper, full, names, or my.module:my_operator, separated by commas.")
-    ] = "full",
-    faces: Annotated[str, typer.Option(help="Rule of faces: any, convex, or quads (convex, 3 or 4 corners).")] = "any",
+        str | None,
+        typer.Option(
+            help="paper, full, modeller, names, or my.module:my_operator, separated by commas.",
+            show_default="the style's",
+        ),
+    ] = None,
+    faces: Annotated[
+        str | None,
+        typer.Option(help="Rule of faces: any, convex, or quads (convex, 3 or 4 corners).", show_default="the style's"),
+    ] = None,
     w_sm: Annotated[float, typer.Option(help="Weight of the IoU.")] = 100.0,
     w_sc: Annotated[float, typer.Option(help="Weight of the complexity V + E + F.")] = 0.3,
     w_si: Annotated[float, typer.Option(help="Weight of the self-intersections.")] = 5.0,
@@ -135,7 +149,10 @@ def solve(
     budget = Budget(refits, seconds, simulations)
     wishes = read_wishes(importance, start, lock, symmetry)
     options = _parse_options(option or [])
-    settings = Settings(agent, options, seed, operators, resolution, max_steps, weights, budget, wishes, faces)
+    chosen = style_named(style).with_choices(agent, operators, faces)
+    settings = Settings(
+        chosen.agent, options, seed, chosen.operators, resolution, max_steps, weights, budget, wishes, chosen.faces
+    )
     settings.check()
     found, problems = _find(images)
     jobs = name_jobs(found, out)

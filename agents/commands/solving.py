@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from agents.base import Agent, check_faces, check_guidance
+from agents.base import Agent
 from agents.budget import Budget
 from agents.commands.ctrl_c import CtrlC
 from agents.commands.report import Report
@@ -51,8 +51,7 @@ class Settings:
             wishes = replace(wishes, symmetry=None)
         wishes = replace(wishes, importance=None)  # so is whether it has the image's proportions
         dummy = replace(self, wishes=wishes).simulator(Silhouette(np.ones((1, 1), np.bool_)))
-        check_guidance(agent, dummy.guidance.names)
-        check_faces(agent, dummy)
+        agent.check(dummy)
         if self.budget.simulations is not None and not agent.runs_simulations:
             raise ConfigError(f"{self.agent} runs no simulations to limit: give --refits or --seconds instead")
         n_threads()

@@ -47,11 +47,17 @@ class QuadsAgent(WholeAgent):
     def __init__(self, config: QuadsConfig) -> None:
         self._config = config
 
-    def suits(self, simulator: Simulator) -> bool:
-        return super().suits(simulator) and not _missing(simulator)
+    def check(self, simulator: Simulator) -> None:
+        """As every agent. Raises ConfigError for a simulator in whose operators quads cannot be told, too."""
+        super().check(simulator)
+        missing = [name for name in OPERATORS if name not in simulator.operators]
+        if missing:
+            raise ConfigError(
+                f"quads builds with {', '.join(OPERATORS)}, and {missing[0]} is not among the operators: "
+                "give the preset modeller"
+            )
 
     def _find(self, simulator: Simulator, meter: Meter) -> Solution:
-        check_operators(simulator)
         if meter.rest() == Budget():
             meter = meter.limited(Budget(self._config.n_refits))
         hill = QuadHill(simulator)
@@ -66,20 +72,6 @@ class QuadsAgent(WholeAgent):
         if not states:
             return finish(simulator, [simulator.initial()], meter, keep_steps=True)
         return finish(simulator, states, meter, keep_steps=True, keep_shape=True)
-
-
-def check_operators(simulator: Simulator) -> None:
-    """Raise ConfigError for a simulator in which quads cannot be told."""
-    missing = _missing(simulator)
-    if missing:
-        raise ConfigError(
-            f"quads builds with {', '.join(OPERATORS)}, and {missing[0]} is not among the operators: "
-            "give the preset modeller"
-        )
-
-
-def _missing(simulator: Simulator) -> list[str]:
-    return [name for name in OPERATORS if name not in simulator.operators]
 
 
 def best_build(hill: QuadHill, places: Sequence[QuadPlace], n_polished: int) -> list[State]:

@@ -471,6 +471,29 @@ def test_simulations__limit_a_tree_search_and_are_refused_by_others(run: Run) ->
     assert refused.code == 2 and "trace runs no simulations" in refused.err
 
 
+# Styles
+
+
+def test_style__brings_agent_operators_and_rule_unless_they_are_given(run: Run) -> None:
+    image = EXAMPLES / "key.png"
+    quick = ("--refits", 60, "--json", "--quiet")
+    told = json.loads(run(image, "--style", "modeller", *quick).out)
+    assert told["agent"] == "quads" and told["settings"]["faces"] == "quads"
+    sequence = ConstructionSequence.load(Path(told["files"]["sequence.json"]))
+    assert {len(face) for face in sequence.final().faces} <= {3, 4}
+    assert "edge_extrude" in {step.operator for step in sequence.steps}
+    other = json.loads(run(image, "--style", "modeller", "--agent", "greedy", "--faces", "convex", *quick).out)
+    assert other["agent"] == "greedy" and other["settings"]["faces"] == "convex"
+    assert json.loads(run(image, "--agent", "trace", *quick).out)["settings"].get("faces", "any") == "any"
+
+
+def test_style__that_is_none_and_operators_that_are_missing_are_told_before_the_work(run: Run) -> None:
+    refused = run(EXAMPLES / "key.png", "--style", "cubist")
+    assert refused.code == 2 and "--style cubist: expected one of paper, modeller" in refused.err
+    refused = run(EXAMPLES / "key.png", "--style", "modeller", "--operators", "full")
+    assert refused.code == 2 and "edge_cap is not among the operators: give the preset modeller" in refused.err
+
+
 # The help
 
 

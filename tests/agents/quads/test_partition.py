@@ -1,7 +1,7 @@
 """Outlines cut into convex quads and triangles: the whole area, as few faces as there can be, holes and all."""
 
-from functools import lru_cache
-from itertools import combinations
+from functools import cache
+from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
@@ -57,7 +57,7 @@ def fewest_faces(points: FloatArray) -> float:
         turns = [corner_sine(points, corners[k], corners[(k + 1) % n], corners[(k + 2) % n]) for k in range(n)]
         return min(turns) >= LEAST_SINE and polygon.buffer(1e-9).covers(shapely.Polygon(points[list(corners)]))
 
-    @lru_cache(maxsize=None)
+    @cache
     def fewest(ring: tuple[int, ...]) -> float:
         if len(ring) < 3:
             return 0
@@ -67,7 +67,7 @@ def fewest_faces(points: FloatArray) -> float:
             for inner in combinations(between, size):
                 if is_face((first, *(ring[k] for k in inner), last)):
                     bounds = [0, *inner, len(ring) - 1]
-                    pieces = [ring[a : b + 1] for a, b in zip(bounds, bounds[1:], strict=False)]
+                    pieces = [ring[a : b + 1] for a, b in pairwise(bounds)]
                     best = min(best, 1 + sum(fewest(piece) for piece in pieces))
         return best
 
@@ -75,7 +75,13 @@ def fewest_faces(points: FloatArray) -> float:
 
 
 def test_known_shapes__have_as_few_faces_as_there_can_be() -> None:
-    for points, sizes in ((TRIANGLE, [3]), (BOX, [4]), (L_SHAPE, [4, 4]), (regular(5), [3, 4]), (regular(8), [4, 4, 4])):
+    for points, sizes in (
+        (TRIANGLE, [3]),
+        (BOX, [4]),
+        (L_SHAPE, [4, 4]),
+        (regular(5), [3, 4]),
+        (regular(8), [4, 4, 4]),
+    ):
         assert sorted(len(face) for face in assert_cut(outline(points)).faces) == sizes
 
 

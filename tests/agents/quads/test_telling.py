@@ -1,5 +1,6 @@
 """Meshes of quads told as they are modelled: every face in its turn, nothing moved afterwards, nothing gone back to."""
 
+import itertools
 from collections import Counter
 
 import numpy as np
@@ -36,7 +37,7 @@ def assert_built(mesh: PolyMesh) -> list[str]:
     """The construction builds the mesh, step by step; the operators that it takes."""
     states = build(GAME, mesh)
     assert canonical_hash(states[-1].mesh) == canonical_hash(mesh)
-    for before, after in zip(states, states[1:], strict=False):
+    for before, after in itertools.pairwise(states):
         assert is_valid(after.mesh) and is_sane(after.mesh, "quads")
         stays = [name for name in before.mesh.vertex_ids if name in after.mesh.vertex_ids]
         places = [[m.vertices[m.vertex_index(name)].tolist() for name in stays] for m in (before.mesh, after.mesh)]
