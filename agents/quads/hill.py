@@ -1,5 +1,6 @@
 """The landscape under the rule: what an outline is worth once it is cut into convex quads and triangles."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,7 @@ from autopoly_env.score import Score, intersection_over_union
 from autopoly_env.simulator import Simulator
 
 _UNCUT = 50.0  # points of r_all that an outline loses which cannot be cut
+_N_LIKELY = 30  # neighbours that are cut before one is tried
 _N_REFINED = 3  # refits at the finest resolution, at most
 _TRIANGLE = 0.5  # elements that a triangle is thought to cost beside its own
 
@@ -84,8 +86,8 @@ class QuadHill:
         found = list(neighbours(place.outline, silhouette, self.contours, n_blamed, holes=True))
         if place.partition is not None:
             found += quad_neighbours(place.outline, place.partition, silhouette, n_blamed)
-        worth = map_threads(self.promise, found)
-        return [found[k] for k in np.argsort(-np.array(worth), kind="stable").tolist()]
+        likely = [found[k] for k in _best_first(map_threads(self.promise, found))[:_N_LIKELY]]
+        return [likely[k] for k in _best_first(map_threads(lambda outline: self.place(outline).total, likely))]
 
     def polished(self, place: QuadPlace) -> list[PolyMesh]:
         """The mesh of a place, refitted and tuned under the rule at the finest resolution; none if it has defects."""
@@ -96,6 +98,11 @@ class QuadHill:
     def shaken(self, place: QuadPlace, rng: np.random.Generator) -> Outline:
         """An outline a few random moves away."""
         return quad_shaken(place.outline, self.simulator.silhouette, rng)
+
+
+def _best_first(worth: Sequence[float]) -> list[int]:
+    order: list[int] = np.argsort(-np.array(worth), kind="stable").tolist()
+    return order
 
 
 def polished(simulator: Simulator, mesh: PolyMesh) -> PolyMesh:

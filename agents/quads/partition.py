@@ -12,7 +12,7 @@ import numpy as np
 from agents.quads import partition_kernels
 from agents.trace.outline import Outline
 from autopoly_env.arrays import FloatArray
-from autopoly_env.mesh import Face, PolyMesh, is_sane
+from autopoly_env.mesh import Face, PolyMesh, Topology, is_sane
 
 LEAST_SINE = 0.02  # of the turn at every corner of a face
 MOST_CORNERS = 160  # of one part and its holes that are cut exactly; the time grows with the fourth power
@@ -76,7 +76,9 @@ def bent(mesh: PolyMesh) -> PolyMesh | None:
 
 def mesh_of(outline: Outline, partition: Partition) -> PolyMesh:
     """The outline as a mesh of the partition's faces."""
-    return PolyMesh.from_faces(outline.loops.vertices, partition.faces)
+    n, f = len(outline.loops.vertices), len(partition.faces)
+    topology = Topology(n, partition.faces)
+    return PolyMesh(outline.loops.vertices, topology, tuple(range(n)), tuple(range(f)), n, f)
 
 
 def _best_of_part(points: FloatArray, around: Face, holes: Sequence[Face], bend: float) -> Partition | None:

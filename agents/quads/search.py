@@ -9,15 +9,17 @@ from agents.budget import Meter
 from agents.climb.coarsened import variants
 from agents.quads.hill import QuadHill, QuadPlace, total_of
 from agents.trace.agent import TraceAgent, TraceConfig
+from agents.trace.reach import Reach
 from agents.trace.rings import trace_rings
 from autopoly_env.refit import LOCAL, THOROUGH
 
 _PRICES = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 6.0)  # of a vertex, of what it costs without inner edges
+_REACH = Reach(more_than_quads=True, holes=True, parts=True, triangles=True, n_steps=10_000)
 _N_SEEDS = 8  # of traced outlines
 _N_FIRST = 4  # of them that are climbed from before anything else
 _SEED_EVERY = 3  # hops, another one
 _LOOK_EVERY = 10  # hops, all neighbours of the best top are tried
-_N_AT_ONCE = 6  # of the neighbours
+_N_AT_ONCE = 16  # of the neighbours
 _N_TRIED = 16  # neighbours that are refitted before it is seen whether one is better
 _N_BLAMED = 6
 _N_THOROUGH = 4
@@ -109,7 +111,8 @@ def _seeds(hill: QuadHill, meter: Meter) -> Iterator[QuadPlace]:
     for n_most, silhouettes in ((_N_SEEDS, [hill.simulator.silhouette]), (3, variants(hill.simulator.silhouette))):
         seeds: dict[tuple[int, ...], QuadPlace] = {}
         for silhouette in silhouettes:
-            for outline in TraceAgent(TraceConfig(prices=_PRICES)).sweep(hill.simulator, trace_rings(silhouette)):
+            rings = trace_rings(silhouette)
+            for outline in TraceAgent(TraceConfig(prices=_PRICES)).sweep(hill.simulator, rings, _REACH):
                 if meter.spent():
                     break
                 [place] = hill.fit([outline], LOCAL, hill.place(outline).score.iou)

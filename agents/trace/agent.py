@@ -75,11 +75,14 @@ class TraceAgent(WholeAgent):
             meter.count(len(_REFITS), max(final_total(simulator, o) for o in found))
             yield from found
 
-    def sweep(self, simulator: Simulator, rings: Sequence[Ring]) -> Iterator[Outline]:
-        """Polygons of the rings from cheap to dear vertices; past the last price on, until one can be built."""
+    def sweep(self, simulator: Simulator, rings: Sequence[Ring], reach: Reach | None = None) -> Iterator[Outline]:
+        """Polygons of the rings from cheap to dear vertices; past the last price on, until one can be built.
+
+        `reach` says what can be, by default with the simulator's operators one vertex after the other.
+        """
         if not rings:
             return
-        reach = Reach.of(simulator)
+        reach = reach or Reach.of(simulator)
         contours = [ring.contour for ring in rings]
         area = float(simulator.silhouette.mask.mean())
         prices = self._config.prices
