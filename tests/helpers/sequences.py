@@ -28,9 +28,9 @@ def gabled(name: Any = "house") -> ConstructionSequence:
     return ConstructionSequence.record({"target": name}, square, SCORE, steps)
 
 
-def walked(seed: int, n_steps: int = 40, shake: float = 0.0) -> ConstructionSequence:
-    """A random walk over all operators, wherever it leads: crossings, pinches, several parts."""
-    walk = random_walk(seed, n_steps=n_steps, shake=shake)
+def walked(seed: int, n_steps: int = 40, shake: float = 0.0, operators: str = "full") -> ConstructionSequence:
+    """A random walk over the operators of a preset, wherever it leads: crossings, pinches, several parts."""
+    walk = random_walk(seed, operators, n_steps, shake)
     steps = [(step.action, step.choice, step.after, SCORE) for step in walk]
     return ConstructionSequence.record({"target": f"walk {seed}"}, walk[0].before, SCORE, steps)
 
