@@ -63,7 +63,7 @@ class ClimbAgent(WholeAgent):
             candidates.append(finish(simulator, tops.built(), meter))
         if not candidates:
             return finish(simulator, [simulator.initial()], meter)
-        best = max(candidates, key=lambda candidate: candidate.score.total)
+        best = max(candidates, key=lambda candidate: simulator.worth(candidate.mesh))
         return Solution(best.sequence, best.mesh, best.score, meter.stats())
 
     def _climb(self, tops: Tops, seed: Place, meter: Meter) -> None:

@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from agents import budget
+from agents.commands.losses import record_of_losses
 from agents.commands.progress import TASK, progress_bar
 from agents.commands.results import Result
 from autopoly_env.sequence import Lesson
@@ -170,6 +171,7 @@ def record_of(result: Result) -> dict[str, Any]:
         "refits": solution.stats.n_refits,
         "seconds": solution.stats.seconds,
         "stopped_by": solution.stats.stopped_by,
+        **({} if result.losses is None else {"kept": record_of_losses(result.losses)}),
         "notes": list(result.notes),
         "files": {name: str(path) for name, path in result.files.items()},
     }

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from autopoly_env.errors import IllegalActionError
-from autopoly_env.mesh import is_sane
 from autopoly_env.operators import STOP, Action, operator_named
 from autopoly_env.simulator import Simulator, State
 
@@ -22,9 +21,9 @@ def pare(simulator: Simulator, states: Sequence[State]) -> tuple[list[State], in
         state = replace(pared[-1], done="")
         children = simulator.transition_all(state, _most_promising(simulator, state))
         n_refits += sum(child.n_refits for child in children)
-        sane = (child for child in children if is_sane(child.mesh))
-        best = max(sane, key=lambda child: child.score.total, default=state)
-        if best.score.total <= state.score.total:
+        sane = (child for child in children if simulator.is_sound(child.mesh))
+        best = max(sane, key=simulator.standing, default=state)
+        if simulator.standing(best) <= simulator.standing(state):
             break
         pared.append(best)
         n_added += 1

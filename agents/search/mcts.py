@@ -77,11 +77,11 @@ class MctsAgent(Agent):
         initial = finds.best
         for solution in play(self._incumbents, simulator, meter):
             finds.incumbents.append(solution)
-            finds.offer(track_of(simulator, solution.sequence))
+            finds.offer(simulator, track_of(simulator, solution.sequence))
         for start in [initial] if finds.best is initial else [finds.best, initial]:
             part = meter.part(1.0 if finds.tops is None else self._config.tree_share)
             for track in self._search(simulator, start, part):
-                finds.offer(track)
+                finds.offer(simulator, track)
         if finds.tops is not None:
             for mesh in (finds.best.state.mesh, *(solution.mesh for solution in finds.incumbents)):
                 finds.tops.add_mesh(mesh)
@@ -119,9 +119,9 @@ class _Finds:
     tops: Tops | None  # None where the search does not go on among outlines
     incumbents: list[Solution] = field(default_factory=list)
 
-    def offer(self, track: Track) -> None:
+    def offer(self, simulator: Simulator, track: Track) -> None:
         """Keep the track if it leads to a better shape than the best so far."""
-        if track.state.score.total > self.best.state.score.total:
+        if simulator.standing(track.state) > simulator.standing(self.best.state):
             self.best = track
 
     def solution(self, simulator: Simulator, meter: Meter) -> Solution:
@@ -129,7 +129,7 @@ class _Finds:
         found = [*self.incumbents, finish(simulator, self.best.states(), meter)]
         if self.tops is not None and self.tops.places():
             found.append(finish(simulator, self.tops.built(), meter))
-        chosen = max(found, key=lambda solution: solution.score.total)
+        chosen = max(found, key=lambda solution: simulator.worth(solution.mesh))
         return Solution(chosen.sequence, chosen.mesh, chosen.score, meter.stats())
 
 

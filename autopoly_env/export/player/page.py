@@ -96,6 +96,9 @@ def _page_data(sequence: ConstructionSequence, target: Silhouette | None, title:
     for before, step, after in zip(meshes, sequence.steps, meshes[1:], strict=False):
         motion = _motion(before, step, after)
         steps.append(_pose(after, step.score, describe_step(step, len(motion["moved"]))) | motion)
+    lost = sequence.settings.get("lost")
+    if isinstance(lost, str):
+        steps[-1]["done"] = f"{steps[-1]['done']} Note: {lost}."
     return {
         "title": title,
         "box": _box(meshes, target),
