@@ -55,7 +55,7 @@ def intersection_over_union(mesh: PolyMesh, target: Target) -> float:
     """IoU, 0 to 1, of the pixels that the mesh covers by half or more and the target's mask.
 
     Where the target has weights: those of the intersection over those of the union, both summed exactly. Where it is
-    scored by area, each pixel counts by the share of it that the mesh covers, overlaps once: the exact IoU of the shapes.
+    scored by area, a pixel counts by the share of it that the mesh covers, overlaps once: the exact IoU of the shapes.
     """
     edges = mesh.topology.boundary_half_edges
     work = workspace(target.resolution, len(edges))

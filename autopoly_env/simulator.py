@@ -27,6 +27,7 @@ from autopoly_env.sequence.lesson import share_moved
 from autopoly_env.silhouette import SMALL, Silhouette
 
 POLISH_RESOLUTION = 512  # of the finest refit; a score may be finer
+MANY_VERTICES = 150  # of a mesh, above which it is not searched or tuned vertex by vertex: that takes minutes
 _N_REFINED = 3  # refits at it, each towards more than the IoU of the one before
 _HAIRLINE_COST = 5.0  # points of r_all off in choosing, for each: as a crossing's
 _LOSS_COST = 50.0  # the same for a part or a hole that is to be kept and is not, times w_sc where that is above 1
@@ -60,8 +61,8 @@ class Simulator:
 
     A user may guide the construction (docs/guidance.md): `importance`, an image that says where matching matters;
     `start`, the mesh to begin with, or a sequence to go on from; `locked`, ids of its vertices that are neither moved
-    nor removed; `symmetry` about a vertical axis, x in 0..1, or True for the axis that suits the silhouette best; `keep`,
-    "holes", "parts" or "all": those of the picture that are to be in the mesh whatever they cost.
+    nor removed; `symmetry` about a vertical axis, x in 0..1, or True for the axis that suits the silhouette best;
+    `keep`, "holes", "parts" or "all": those of the picture that are to be in the mesh whatever they cost.
 
     Raises ConfigError for settings that are out of range or contradict each other.
     """
@@ -96,9 +97,9 @@ class Simulator:
         self.match_threshold = match_threshold
         own = self.silhouette.resolution
         self._target = self.silhouette.target(resolution)
-        self._scored = self.silhouette.target(own) if self.silhouette.is_small else self._target
+        self._scored = self.silhouette.target(own) if self.silhouette.is_scored_by_area else self._target
         self.finest = min(own, POLISH_RESOLUTION)  # pixels a side at which meshes are finished
-        self._refined_at = own * -(-SMALL // own) if self.silhouette.is_small else self.finest  # whole blocks
+        self._refined_at = own * -(-SMALL // own) if self.silhouette.is_scored_by_area else self.finest  # whole blocks
         self._refit_targets: dict[tuple[int, float], RefitTarget] = {}
 
     def __getstate__(self) -> dict[str, Any]:
@@ -129,7 +130,7 @@ class Simulator:
             "max_steps": self.max_steps,
             "match_threshold": self.match_threshold,
             **asdict(self.weights),
-            **({"scored_by": "area"} if self.silhouette.is_small else {}),
+            **({"scored_by": "area"} if self.silhouette.is_scored_by_area else {}),
             **importance_settings(self.silhouette),
             **self.guidance.settings(),
         }
@@ -342,8 +343,10 @@ class Simulator:
         return best
 
     def polish(self, mesh: PolyMesh) -> PolyMesh:
-        """The mesh refined, then tuned at the same resolution: no worse than it was."""
+        """The mesh refined, then tuned at the same resolution, unless it has many vertices: no worse than it was."""
         refined = self.refine(mesh)
+        if len(mesh.vertices) > MANY_VERTICES:
+            return refined
         tuned = tune(refined, self.silhouette.target(self.finest), self.guidance.bonds(mesh))
         return max((refined, tuned), key=self.worth)
 

@@ -83,7 +83,7 @@ class ClimbAgent(WholeAgent):
 def climb(hill: Hill, place: Place, config: ClimbConfig, meter: Meter) -> Iterator[Place]:
     """Move to the best neighbour while one is better, looking harder before giving up; yield every place on the way."""
     for _ in range(config.n_rounds):
-        if meter.spent():
+        if meter.spent() or place.outline.is_fine:
             return
         places = fitted_neighbours(hill, place, config.n_blamed, meter)
         n_fits = len(places)

@@ -200,7 +200,9 @@ def _solve(job: Job, settings: Settings, out: Path, report: Report, ctrl_c: Ctrl
 
 def _notes_on_scoring(silhouette: Silhouette) -> list[str]:
     size = silhouette.resolution
-    return [f"fewer than {SMALL} pixels a side ({size}): r_sm is of exact areas"] if silhouette.is_small else []
+    return (
+        [f"fewer than {SMALL} pixels a side ({size}): r_sm is of exact areas"] if silhouette.is_scored_by_area else []
+    )
 
 
 def _write_overview(overview: Overview, out: Path, report: Report) -> Path | None:

@@ -27,6 +27,7 @@ from autopoly_env.simulator import Simulator, State
 
 _REFITS = (LOCAL, THOROUGH)
 _HIGHEST_PRICE = 1000.0
+_N_FINE = 2  # fine outlines that are refitted, the best as they are
 
 
 @dataclass(frozen=True)
@@ -65,14 +66,20 @@ class TraceAgent(WholeAgent):
         return finish(simulator, build_best(simulator, outlines, self._config.n_constructed), meter)
 
     def outlines(self, simulator: Simulator, meter: Meter) -> Iterator[Outline]:
-        """All outlines of the sweep that can be built, each refitted in two ways and then as it was."""
+        """All outlines of the sweep that can be built, each refitted in two ways and then as it was.
+
+        Of those that are fine the best two are refitted, in one way.
+        """
         pixels = simulator.silhouette.target(simulator.resolution)
-        for outline in self.sweep(simulator, trace_rings(simulator.silhouette)):
+        outlines = list(self.sweep(simulator, trace_rings(simulator.silhouette)))
+        fine = sorted((o for o in outlines if o.is_fine), key=lambda o: -final_total(simulator, o))
+        for outline in outlines:
             if meter.spent():
                 return
+            configs = () if outline in fine[_N_FINE:] else (LOCAL,) if outline.is_fine else _REFITS
             target = simulator.refit_target(outline.score(pixels, simulator.weights).iou)
-            found = [*(outline.refitted(target, config) for config in _REFITS), outline]
-            meter.count(len(_REFITS), max(final_total(simulator, o) for o in found))
+            found = [*(outline.refitted(target, config) for config in configs), outline]
+            meter.count(len(configs), max(final_total(simulator, o) for o in found))
             yield from found
 
     def sweep(self, simulator: Simulator, rings: Sequence[Ring]) -> Iterator[Outline]:

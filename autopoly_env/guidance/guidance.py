@@ -57,7 +57,7 @@ class Guidance:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The wishes there are that only agents which play step by step can heed: some of start, locked and symmetry."""
+        """The wishes that only agents which play step by step can heed: some of start, locked and symmetry."""
         wishes = {"start": self.start is not None, "locked": bool(self.locked), "symmetry": self.axis is not None}
         return tuple(name for name, is_given in wishes.items() if is_given)
 
@@ -145,7 +145,7 @@ def _check_start(mesh: PolyMesh) -> None:
     crossings, flipped = defects_of(mesh)
     if crossings:
         raise ConfigError(
-            f"the start mesh has {crossings} pairs of edges that cross, touch or nearly touch: pull them apart"
+            f"the start mesh has {crossings} pairs of edges that cross or (nearly) touch: pull them apart"
         )
     if flipped:
         raise ConfigError(f"the start mesh has {flipped} flipped or empty faces: turn them over or leave them out")

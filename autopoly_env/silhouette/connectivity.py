@@ -14,7 +14,7 @@ LEVEL = 0.4990123  # of coverage, about half; a pixel covered by just this much 
 
 
 def torn_corners(coverage: FloatArray) -> BoolArray:
-    """Mask (R-1, R-1) of the corners between four pixels where two filled ones meet diagonally and do not hang together.
+    """Mask (R-1, R-1) of the corners between four pixels where two filled ones meet diagonally and are apart.
 
     They do unless they are of two parts, neither of them one pixel wide there, or are so faint that a surface through
     the four values is below the level in the middle (the asymptotic decider of Nielson and Hamann 1991).
@@ -48,6 +48,13 @@ def label_holes(coverage: FloatArray) -> IntArray:
     names, numbers = np.unique(np.where(labels == labels[0, 0], 0, labels), return_inverse=True)
     assert names[0] == 0  # the background around
     return numbers.reshape(labels.shape)[1:-1, 1:-1]
+
+
+def is_slanting_line(mask: BoolArray) -> bool:
+    """Whether a mask (R, R) is nothing but lines one pixel wide, some of which hang together by corners alone."""
+    if _thick(mask).any():
+        return False
+    return int(_areas(mask).max()) > int(label_parts(mask.astype(np.float64)).max())
 
 
 def _areas(among: BoolArray) -> IntArray:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from autopoly_env.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from autopoly_env.errors import ConfigError, SilhouetteError
 from autopoly_env.silhouette import object_mask
+from autopoly_env.silhouette.connectivity import is_slanting_line
 from autopoly_env.silhouette.image_files import find_images
 from autopoly_env.silhouette.loading import ImageSource, read_picture
 
@@ -112,10 +114,13 @@ class Silhouette:
         """R, in pixels a side."""
         return len(self.mask)
 
-    @property
-    def is_small(self) -> bool:
-        """Whether the picture has fewer than `SMALL` pixels a side, and is scored on exact areas."""
-        return self.resolution < SMALL
+    @cached_property
+    def is_scored_by_area(self) -> bool:
+        """Whether the picture has so few pixels that it is scored on exact areas: fewer than `SMALL` a side.
+
+        Not so drawings in lines one pixel wide, some of them slanting: their pixels are steps, which nobody means.
+        """
+        return self.resolution < SMALL and not is_slanting_line(self.mask)
 
     def target(self, resolution: int) -> Target:
         """The silhouette on a grid of `resolution` x `resolution` cells: exact area averages, kept once made.
@@ -129,7 +134,7 @@ class Silhouette:
             raise ConfigError(f"target resolution {resolution} is too small; expected at least 1: raise it")
         if resolution not in self._targets:
             weights = None if self.weights is None else area_means(self.weights, (resolution, resolution))
-            by_area = self.is_small and resolution == self.resolution
+            by_area = self.is_scored_by_area and resolution == self.resolution
             self._targets[resolution] = Target(_area_average(self.mask, resolution), weights, by_area)
         return self._targets[resolution]
 

@@ -51,7 +51,7 @@ def test_parts__are_no_fewer_than_with_8_neighbours_and_no_more_than_with_4(seed
 
 
 def euler_number(coverage: FloatArray) -> int:
-    """Pixels - sides - corners' worth, by counting: V - E + F of the pixels as squares, corners that are torn doubled."""
+    """V - E + F of the pixels as squares, corners that are torn counted twice."""
     padded = np.pad(coverage > 0.5, 1)
     n_faces = int(padded.sum())
     n_edges = int((padded[1:] | padded[:-1]).sum() + (padded[:, 1:] | padded[:, :-1]).sum())
