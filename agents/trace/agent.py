@@ -72,11 +72,12 @@ class TraceAgent(WholeAgent):
         """
         pixels = simulator.silhouette.target(simulator.resolution)
         outlines = list(self.sweep(simulator, trace_rings(simulator.silhouette)))
-        fine = sorted((o for o in outlines if o.is_fine), key=lambda o: -final_total(simulator, o))
-        for outline in outlines:
+        fine = [k for k, outline in enumerate(outlines) if outline.is_fine]
+        rough = sorted(fine, key=lambda k: -final_total(simulator, outlines[k]))[_N_FINE:]
+        for k, outline in enumerate(outlines):
             if meter.spent():
                 return
-            configs = () if outline in fine[_N_FINE:] else (LOCAL,) if outline.is_fine else _REFITS
+            configs = () if k in rough else (LOCAL,) if outline.is_fine else _REFITS
             target = simulator.refit_target(outline.score(pixels, simulator.weights).iou)
             found = [*(outline.refitted(target, config) for config in configs), outline]
             meter.count(len(configs), max(final_total(simulator, o) for o in found))
