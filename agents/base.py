@@ -51,7 +51,7 @@ class Agent(ABC):
         try:
             meter.add([best.state])
             for track in self._search(simulator, best, meter):
-                if track.state.score.total > best.state.score.total:
+                if simulator.standing(track.state) > simulator.standing(best.state):
                     best = track
         except KeyboardInterrupt:
             meter.stopped_by = "interrupted"

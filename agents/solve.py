@@ -27,6 +27,7 @@ Examples:
   python -m agents.solve mug.png --importance face.png
   python -m agents.solve mug.png --agent beam --start mug.obj --lock 0,3
   python -m agents.solve vase.png --agent beam --symmetry auto
+  python -m agents.solve gear.png --keep holes
 
 \b
 For every image, OUT/<name of the file without its ending>/ gets
@@ -111,6 +112,10 @@ def solve(
         str | None,
         typer.Option(metavar="[auto|X]", help="Left and right alike, about the best axis or x = X (0 to 1)."),
     ] = None,
+    keep: Annotated[
+        str | None,
+        typer.Option(metavar="[holes|parts|all]", help="What of the picture is to be in the mesh, whatever it costs."),
+    ] = None,
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out"),
     as_json: Annotated[
         bool, typer.Option("--json", help="Print a JSON record a line as each image is done, no table.")
@@ -133,7 +138,7 @@ def solve(
     shown = read_columns(columns, FORMATS, COLUMNS)
     weights = ScoreWeights(w_sm, w_sc, w_si, w_locality)
     budget = Budget(refits, seconds, simulations)
-    wishes = read_wishes(importance, start, lock, symmetry)
+    wishes = read_wishes(importance, start, lock, symmetry, keep)
     options = _parse_options(option or [])
     settings = Settings(agent, options, seed, operators, resolution, max_steps, weights, budget, wishes, faces)
     settings.check()

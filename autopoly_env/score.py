@@ -32,7 +32,7 @@ class ScoreWeights:
 class Score:
     """What a mesh is worth, and why."""
 
-    iou: float  # r_sm, 0 to 1, of the rendering binarised at half coverage
+    iou: float  # r_sm, 0 to 1, of the rendering binarised at half coverage; of small pictures' exact areas
     complexity: int  # r_sc = V + E + F
     self_intersections: int  # r_si
     total: float  # r_all
@@ -54,7 +54,8 @@ def score(mesh: PolyMesh, target: Target, weights: ScoreWeights) -> Score:
 def intersection_over_union(mesh: PolyMesh, target: Target) -> float:
     """IoU, 0 to 1, of the pixels that the mesh covers by half or more and the target's mask.
 
-    Where the target has weights: those of the intersection over those of the union, both summed exactly.
+    Where the target has weights: those of the intersection over those of the union, both summed exactly. Where it is
+    scored by area, a pixel counts by the share of it that the mesh covers, overlaps once: the exact IoU of the shapes.
     """
     edges = mesh.topology.boundary_half_edges
     work = workspace(target.resolution, len(edges))

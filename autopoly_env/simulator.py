@@ -14,6 +14,7 @@ import shapely
 
 from autopoly_env.arrays import BoolArray
 from autopoly_env.compute import Job, Routine, map_threads, run
+from autopoly_env.details import Details, hairlines
 from autopoly_env.errors import ConfigError, IllegalActionError, MeshError
 from autopoly_env.guidance import Guidance, ImportanceSource, importance_settings, weighted
 from autopoly_env.mesh import FaceRule, PolyMesh, broken_faces, check_faces, defects_of, face_rule
@@ -23,10 +24,13 @@ from autopoly_env.refit import FROM_AFAR, LOCAL, THOROUGH, RefitConfig, RefitTar
 from autopoly_env.score import Score, ScoreWeights, score
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence.lesson import share_moved
-from autopoly_env.silhouette import Silhouette
+from autopoly_env.silhouette import SMALL, Silhouette
 
 POLISH_RESOLUTION = 512  # of the finest refit; a score may be finer
+MANY_VERTICES = 150  # of a mesh, above which it is not searched or tuned vertex by vertex: that takes minutes
 _N_REFINED = 3  # refits at it, each towards more than the IoU of the one before
+_HAIRLINE_COST = 5.0  # points of r_all off in choosing, for each: as a crossing's
+_LOSS_COST = 50.0  # the same for a part or a hole that is to be kept and is not, times w_sc where that is above 1
 _BACKGROUND_STEPS = 16  # between weights 0 and 1, so that few targets are prepared
 
 
@@ -58,7 +62,8 @@ class Simulator:
 
     A user may guide the construction (docs/guidance.md): `importance`, an image that says where matching matters;
     `start`, the mesh to begin with, or a sequence to go on from; `locked`, ids of its vertices that are neither moved
-    nor removed; `symmetry` about a vertical axis, x in 0..1, or True for the axis that suits the silhouette best.
+    nor removed; `symmetry` about a vertical axis, x in 0..1, or True for the axis that suits the silhouette best;
+    `keep`, "holes", "parts" or "all": those of the picture that are to be in the mesh whatever they cost.
 
     Raises ConfigError for settings that are out of range or contradict each other.
     """
@@ -77,6 +82,7 @@ class Simulator:
         start: PolyMesh | ConstructionSequence | None = None,
         locked: Collection[int] = (),
         symmetry: bool | float | None = None,
+        keep: str | None = None,
     ) -> None:
         if not 8 <= resolution <= 1024:
             raise ConfigError(f"resolution {resolution}: expected 8 to 1024 pixels a side")
@@ -86,15 +92,18 @@ class Simulator:
             raise ConfigError(f"match_threshold {match_threshold}: expected an IoU above 0, at most 1")
         self.faces = face_rule(faces)
         self.silhouette = silhouette if importance is None else weighted(silhouette, importance)
-        self.guidance = Guidance.of(self.silhouette, start, locked, symmetry)
+        self.guidance = Guidance.of(self.silhouette, start, locked, symmetry, keep)
         self._check_start()
         self.operators = tuple(operator.name for operator in preset(operators))
         self.resolution = resolution
         self.weights = weights or ScoreWeights()
         self.max_steps = max_steps
         self.match_threshold = match_threshold
+        own = self.silhouette.resolution
         self._target = self.silhouette.target(resolution)
-        self.finest = min(self.silhouette.resolution, POLISH_RESOLUTION)  # pixels a side at which meshes are finished
+        self._scored = self.silhouette.target(own) if self.silhouette.is_scored_by_area else self._target
+        self.finest = min(own, POLISH_RESOLUTION)  # pixels a side at which meshes are finished
+        self._refined_at = own * -(-SMALL // own) if self.silhouette.is_scored_by_area else self.finest  # whole blocks
         self._refit_targets: dict[tuple[int, float], RefitTarget] = {}
 
     def __getstate__(self) -> dict[str, Any]:
@@ -126,6 +135,7 @@ class Simulator:
             "match_threshold": self.match_threshold,
             **asdict(self.weights),
             **({} if self.faces == "any" else {"faces": self.faces}),
+            **({"scored_by": "area"} if self.silhouette.is_scored_by_area else {}),
             **importance_settings(self.silhouette),
             **self.guidance.settings(),
         }
@@ -174,11 +184,11 @@ class Simulator:
             yield PolyMesh.from_faces(corners, [(0, 1, 2, 3)])
 
     def defects_of(self, mesh: PolyMesh) -> tuple[int, int]:
-        """(crossings, faces that are flipped, empty or against the simulator's rule) of a mesh."""
+        """(crossings and hairlines, faces that are flipped, empty or against the simulator's rule) of a mesh."""
         return defects_of(mesh, self.faces)
 
     def is_sane(self, mesh: PolyMesh) -> bool:
-        """Whether no edges cross and no face is flipped, empty or against the simulator's rule."""
+        """Whether no edges cross or nearly meet, and no face is flipped, empty or against the simulator's rule."""
         return self.defects_of(mesh) == (0, 0)
 
     def _check_start(self) -> None:
@@ -200,9 +210,10 @@ class Simulator:
     def score(self, mesh: PolyMesh, before: PolyMesh | None = None) -> Score:
         """What a mesh is worth at the simulator's resolution; as the result of a step from `before`, if that is given.
 
+        Small pictures are scored on exact areas at any resolution.
         Then `docked` is taken off the total, by which agents choose.
         """
-        worth = score(mesh, self._target, self.weights)
+        worth = score(mesh, self._scored, self.weights)
         off = 0.0 if before is None else self.docked(before, mesh)
         return replace(worth, total=worth.total - off) if off else worth
 
@@ -214,6 +225,38 @@ class Simulator:
     def final_score(self, mesh: PolyMesh) -> Score:
         """What a mesh is worth at the silhouette's own resolution: the paper's r_all, whatever led to it."""
         return score(mesh, self.silhouette.target(self.silhouette.resolution), self.weights)
+
+    def hairlines(self, mesh: PolyMesh) -> int:
+        """How many corridors and slits a mesh has that are too narrow to be seen and not in the picture."""
+        return hairlines(mesh, self.silhouette.target(self.finest))
+
+    def is_sound(self, mesh: PolyMesh) -> bool:
+        """Whether the mesh is sane, keeps the rule of faces and has no hairlines in view of the picture."""
+        return self.is_sane(mesh) and not self.hairlines(mesh)
+
+    def off(self, mesh: PolyMesh) -> float:
+        """Points of r_all that count against a mesh in choosing, though not in its score.
+
+        They are five for every hairline, as for a crossing, and fifty or more for every hole and part of the picture
+        that is to be kept (`keep`) and is not there.
+        """
+        return _HAIRLINE_COST * self.hairlines(mesh) + _LOSS_COST * max(1.0, self.weights.w_sc) * self._n_lost(mesh)
+
+    def _n_lost(self, mesh: PolyMesh) -> int:
+        if not self.guidance.keep:
+            return 0
+        details = Details.of(self.silhouette)
+        n_parts, n_holes = details.kept(mesh)
+        lost = {"parts": len(details.parts) - n_parts, "holes": len(details.holes) - n_holes}
+        return sum(lost[kind] for kind in self.guidance.keep)
+
+    def standing(self, state: State) -> float:
+        """What states are chosen by: their total, less what is `off` their mesh."""
+        return state.score.total - self.off(state.mesh)
+
+    def worth(self, mesh: PolyMesh) -> float:
+        """What finished meshes are chosen by: r_all at the silhouette's own resolution, less what is `off`."""
+        return self.final_score(mesh).total - self.off(mesh)
 
     def legal_actions(self, state: State) -> list[Action]:
         """What may be done next; STOP first, and nothing once it is over."""
@@ -347,20 +390,23 @@ class Simulator:
     def refine(self, mesh: PolyMesh) -> PolyMesh:
         """The mesh refitted at the silhouette's own resolution (at most `POLISH_RESOLUTION`), as long as that helps."""
         bonds = self.guidance.bonds(mesh)
-        best, score = mesh, self.final_score(mesh)
+        best, worth = mesh, self.worth(mesh)
         for _ in range(_N_REFINED):
-            fitted = refit(best, self.refit_target(score.iou, self.finest), LOCAL, bonds, self.faces).mesh
-            fitted_score = self.final_score(fitted)
-            if not fitted_score.total > score.total:
+            target = self.refit_target(self.final_score(best).iou, self._refined_at)
+            fitted = refit(best, target, LOCAL, bonds, self.faces).mesh
+            fitted_worth = self.worth(fitted)
+            if not fitted_worth > worth:
                 break
-            best, score = fitted, fitted_score
+            best, worth = fitted, fitted_worth
         return best
 
     def polish(self, mesh: PolyMesh) -> PolyMesh:
-        """The mesh refined, then tuned at the same resolution: no worse than it was."""
+        """The mesh refined, then tuned at the same resolution, unless it has many vertices: no worse than it was."""
         refined = self.refine(mesh)
+        if len(mesh.vertices) > MANY_VERTICES:
+            return refined
         tuned = tune(refined, self.silhouette.target(self.finest), self.guidance.bonds(mesh), self.faces)
-        return max((refined, tuned), key=lambda candidate: self.final_score(candidate).total)
+        return max((refined, tuned), key=self.worth)
 
 
 def _ends_changed(before: PolyMesh, after: PolyMesh) -> set[int]:

@@ -11,6 +11,7 @@ from rich.text import Text
 
 from agents import budget
 from agents.commands.columns import LESSON
+from agents.commands.losses import record_of_losses
 from agents.commands.progress import TASK, progress_bar
 from agents.commands.results import Result
 from autopoly_env.sequence import Lesson
@@ -189,6 +190,7 @@ def record_of(result: Result) -> dict[str, Any]:
         "seed": settings["seed"],
         **_numbers_of(result),
         "stopped_by": result.solution.stats.stopped_by,
+        **({} if result.losses is None else {"kept": record_of_losses(result.losses)}),
         "notes": list(result.notes),
         "files": {name: str(path) for name, path in result.files.items()},
     }

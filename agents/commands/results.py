@@ -15,6 +15,7 @@ from PIL import Image
 from agents.solution import Solution
 from autopoly_env import viewer
 from autopoly_env.arrays import ByteArray
+from autopoly_env.details import Losses
 from autopoly_env.errors import OutputError
 from autopoly_env.export import contact_sheet, save_html, save_png, to_obj, to_svg
 from autopoly_env.silhouette import Silhouette
@@ -34,6 +35,7 @@ class Result:
     solution: Solution
     notes: tuple[str, ...]
     files: dict[str, Path]  # by their names, as in RESULTS
+    losses: Losses | None = None  # where they were looked at
 
 
 def claim_folder(folder: Path) -> None:

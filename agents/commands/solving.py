@@ -12,6 +12,7 @@ import numpy as np
 from agents.base import Agent, check_faces, check_guidance
 from agents.budget import Budget
 from agents.commands.ctrl_c import CtrlC
+from agents.commands.losses import in_words, losses_of
 from agents.commands.report import Report
 from agents.commands.results import OVERVIEW, RESULTS, Overview, Result, write_results
 from agents.commands.wishes import NO_WISHES, Wishes
@@ -24,7 +25,7 @@ from autopoly_env.export import save_png
 from autopoly_env.mesh import face_rule
 from autopoly_env.outside import described
 from autopoly_env.score import ScoreWeights
-from autopoly_env.silhouette import Silhouette, load_silhouette
+from autopoly_env.silhouette import SMALL, Silhouette, load_silhouette
 from autopoly_env.simulator import Simulator
 
 
@@ -190,11 +191,22 @@ def _solve(job: Job, settings: Settings, out: Path, report: Report, ctrl_c: Ctrl
     simulator, agent = settings.simulator(silhouette), settings.new_agent()
     with ctrl_c.searching():
         solution = solved(agent, simulator, settings.budget, report.progress)
+    losses = losses_of(solution, simulator)
+    lost = in_words(losses, simulator)
+    own = {**settings.as_dict(), **({"lost": lost} if lost else {})}
     sequence = solution.sequence
-    sequence = replace(sequence, settings={**sequence.settings, **settings.as_dict()})
+    sequence = replace(sequence, settings={**sequence.settings, **own})
     solution = replace(solution, sequence=sequence)
     files = write_results(out / job.name, solution, silhouette, ctrl_c.shielded)
-    return Result(job.image, job.name, solution, (*job.notes, *silhouette.notes), files), silhouette
+    notes = [*job.notes, *silhouette.notes, *_notes_on_scoring(silhouette), *([lost] if lost else [])]
+    return Result(job.image, job.name, solution, tuple(notes), files, losses), silhouette
+
+
+def _notes_on_scoring(silhouette: Silhouette) -> list[str]:
+    size = silhouette.resolution
+    return (
+        [f"fewer than {SMALL} pixels a side ({size}): r_sm is of exact areas"] if silhouette.is_scored_by_area else []
+    )
 
 
 def _write_overview(overview: Overview, out: Path, report: Report) -> Path | None:

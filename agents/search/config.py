@@ -10,7 +10,11 @@ from autopoly_env.errors import ConfigError
 class MctsConfig:
     """How `mcts` searches."""
 
-    seeds: tuple[str, ...] = ("climb", "decimate")  # agents whose best shape it goes on from before the rectangle
+    seeds: tuple[str, ...] = (
+        "trace",
+        "climb",
+        "decimate",
+    )  # agents whose best shape it goes on from before the rectangle
     n_simulations: int = 16  # before a step is committed
     prior: Literal["residual", "uniform"] = "residual"
     formula: Literal["puct", "uct"] = "puct"

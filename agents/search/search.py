@@ -115,7 +115,8 @@ class Search:
         untried = node.untried or []
         batch, node.untried = dict(untried[: self._config.n_expanded]), untried[self._config.n_expanded :]
         states = self._evaluator.expand(self._simulator, node.track.state, list(batch)) if batch else []
-        made = [Node(Track(s, node.track), node, batch[s.action]) for s in states if s.action and self._is_new(s)]
+        fresh = [s for s in states if not self._simulator.hairlines(s.mesh) and self._is_new(s)]
+        made = [Node(Track(s, node.track), node, batch[s.action]) for s in fresh if s.action]
         node.children += made
         yield from (child.track for child in made)
         meter.add_simulation(len(made))

@@ -19,6 +19,7 @@ from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import Silhouette
 
 _LEAST_ROOM = 1 / 64  # beside an axis, in the unit square
+KEPT = {"holes": ("holes",), "parts": ("parts",), "all": ("holes", "parts")}  # what may be asked to be kept
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +30,7 @@ class Guidance:
     earlier: ConstructionSequence | None = None  # what led to `start`, if it was given
     locked: frozenset[int] = frozenset()  # ids of vertices that stay, and stay where they are
     axis: float | None = None  # x of the axis about which the outline is symmetric
+    keep: tuple[str, ...] = ()  # "holes", "parts": each of the picture's is to be one of the mesh's, whatever it costs
 
     @classmethod
     def of(
@@ -37,6 +39,7 @@ class Guidance:
         start: PolyMesh | ConstructionSequence | None,
         locked: Collection[int],
         symmetry: bool | float | None,
+        keep: str | None = None,
     ) -> "Guidance":
         """See `Simulator` for the arguments. Raises ConfigError for what is impossible or contradicts itself."""
         earlier, mesh = (start, start.final()) if isinstance(start, ConstructionSequence) else (None, start)
@@ -44,7 +47,9 @@ class Guidance:
             _check_start(mesh)
         _check_locked(mesh, locked)
         axis = None if symmetry is None or symmetry is False else _axis(silhouette, symmetry)
-        guidance = cls(mesh, earlier, frozenset(map(int, locked)), axis)
+        if keep is not None and keep not in KEPT:
+            raise ConfigError(f"keep {keep!r}: expected one of {', '.join(KEPT)}")
+        guidance = cls(mesh, earlier, frozenset(map(int, locked)), axis, () if keep is None else KEPT[keep])
         if mesh is not None and axis is not None:
             guidance.check_symmetric(mesh)
             _check_images_locked(mesh, guidance.locked, axis)
@@ -52,7 +57,7 @@ class Guidance:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The wishes there are: some of start, locked and symmetry."""
+        """The wishes that only agents which play step by step can heed: some of start, locked and symmetry."""
         wishes = {"start": self.start is not None, "locked": bool(self.locked), "symmetry": self.axis is not None}
         return tuple(name for name, is_given in wishes.items() if is_given)
 
@@ -67,6 +72,8 @@ class Guidance:
             values["locked"] = sorted(self.locked)
         if self.axis is not None:
             values["symmetry"] = self.axis
+        if self.keep:
+            values["keep"] = ",".join(self.keep)
         return values
 
     def bonds(self, mesh: PolyMesh) -> Bonds | None:
@@ -141,7 +148,9 @@ def _check_start(mesh: PolyMesh) -> None:
         raise ConfigError(f"vertex {name} of the start mesh is at ({x:g}, {y:g}), outside the unit square: scale it in")
     crossings, flipped = defects_of(mesh)
     if crossings:
-        raise ConfigError(f"the start mesh has {crossings} pairs of edges that cross or touch: pull them apart")
+        raise ConfigError(
+            f"the start mesh has {crossings} pairs of edges that cross or (nearly) touch: pull them apart"
+        )
     if flipped:
         raise ConfigError(f"the start mesh has {flipped} flipped or empty faces: turn them over or leave them out")
 

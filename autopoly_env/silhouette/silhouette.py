@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -9,12 +10,14 @@ import numpy as np
 from autopoly_env.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from autopoly_env.errors import ConfigError, SilhouetteError
 from autopoly_env.silhouette import object_mask
+from autopoly_env.silhouette.connectivity import is_slanting_line
 from autopoly_env.silhouette.image_files import find_images
 from autopoly_env.silhouette.loading import ImageSource, read_picture
 
-__all__ = ["ImageSource", "Silhouette", "Target", "find_images", "load_silhouette"]
+__all__ = ["SMALL", "ImageSource", "Silhouette", "Target", "find_images", "load_silhouette"]
 
 WEIGHT_STEPS = 2**20  # of a weight of 1
+SMALL = 64  # pixels a side; a smaller picture has too few pixels to tell shapes apart by counting them
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -32,10 +35,14 @@ class Target:
     Where cells are not all worth the same, `weights` (R, R) >= 0 say so, rounded to multiples of 2**-20: sums of them
     are then exact. `weight_sum` (R, R+1) are their prefix sums, None without, and each sum above (`mask_sum` and
     `n_filled` as float64) counts every cell times its weight.
+
+    `by_area`: the IoU counts a cell by the share of it that a mesh covers; otherwise as 1 from half coverage on, as the
+    paper does.
     """
 
     coverage: FloatArray
     weights: FloatArray | None = None
+    by_area: bool = False
     mask: BoolArray = field(init=False)
     row_sum: FloatArray = field(init=False)
     row_square_sum: FloatArray = field(init=False)
@@ -71,7 +78,7 @@ class Target:
         return f"Target(resolution={self.resolution})"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Target, (self.coverage, self.weights)  # so that an unpickled one is read-only as well
+        return Target, (self.coverage, self.weights, self.by_area)  # so that an unpickled one is read-only as well
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,10 +114,19 @@ class Silhouette:
         """R, in pixels a side."""
         return len(self.mask)
 
+    @cached_property
+    def is_scored_by_area(self) -> bool:
+        """Whether the picture has so few pixels that it is scored on exact areas: fewer than `SMALL` a side.
+
+        Not so drawings in lines one pixel wide, some of them slanting: their pixels are steps, which nobody means.
+        """
+        return self.resolution < SMALL and not is_slanting_line(self.mask)
+
     def target(self, resolution: int) -> Target:
         """The silhouette on a grid of `resolution` x `resolution` cells: exact area averages, kept once made.
 
-        The resolution need not divide the silhouette's own, and may exceed it (which gives blocks).
+        The resolution need not divide the silhouette's own, and may exceed it (which gives blocks). At its own, that of
+        a small picture is scored by area.
 
         Raises ConfigError for a resolution below 1.
         """
@@ -118,7 +134,8 @@ class Silhouette:
             raise ConfigError(f"target resolution {resolution} is too small; expected at least 1: raise it")
         if resolution not in self._targets:
             weights = None if self.weights is None else area_means(self.weights, (resolution, resolution))
-            self._targets[resolution] = Target(_area_average(self.mask, resolution), weights)
+            by_area = self.is_scored_by_area and resolution == self.resolution
+            self._targets[resolution] = Target(_area_average(self.mask, resolution), weights, by_area)
         return self._targets[resolution]
 
     def pyramid(self, levels: Sequence[int]) -> tuple[Target, ...]:

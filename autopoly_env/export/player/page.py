@@ -102,6 +102,9 @@ def _page_data(sequence: ConstructionSequence, target: Silhouette | None, title:
         steps.append(_pose(after, step.score, describe_step(step, len(motion["moved"]), n_left)) | motion)
         steps[-1]["seconds"] = round(seconds_of(step, before, after), 2)
         steps[-1]["part"] = parts.name(number)
+    lost = sequence.settings.get("lost")
+    if isinstance(lost, str):
+        steps[-1]["done"] = f"{steps[-1]['done']} Note: {lost}."
     return {
         "title": title,
         "lesson": describe_lesson(Lesson.of(sequence), len(parts.names)),

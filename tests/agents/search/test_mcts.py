@@ -146,11 +146,12 @@ def test_seeds__get_a_share_of_what_is_left_of_the_budget() -> None:
     assert asked == [Budget(refits=round(SHARE * rest)), Budget(refits=round(SHARE * (rest - n_traced)))]
 
 
-def test_target__that_the_rectangle_matches_already_ends_the_search_at_once() -> None:
+def test_target__that_the_rectangle_matches_already_leaves_nothing_to_search() -> None:
     game = Simulator(painted(SQUARE), resolution=64)
-    solution = make_agent("mcts").solve(game, Budget(refits=1000))
+    solution = make_agent("mcts", seeds=()).solve(game, Budget(refits=1000))
     assert solution.score.iou == 1.0 and not solution.sequence.steps
     assert solution.stats.n_refits <= 2 and solution.stats.stopped_by == "finished"
+    assert make_agent("mcts").solve(game, Budget(refits=1000)).mesh == solution.mesh  # the seeds have a look
 
 
 def test_seeds__that_cannot_take_guidance_are_left_out() -> None:
