@@ -12,6 +12,7 @@ from agents.commands.running import FAILURE, complain, run_command
 from autopoly_env.errors import AutoPolyError, ConfigError, OutputError, SequenceError
 from autopoly_env.export.formats import LISTED, Export, Format, find_format, format_of, formats
 from autopoly_env.outside import described
+from autopoly_env.shown import tame
 
 if TYPE_CHECKING:
     from autopoly_env.sequence import ConstructionSequence
@@ -96,7 +97,7 @@ def export(
     for source, goal in jobs:
         try:
             _write(made, Export(_load(source, step), silhouette, depth), goal)
-            print(goal)
+            print(tame(str(goal)))
         except ConfigError:
             raise
         except AutoPolyError as error:

@@ -1,7 +1,5 @@
 """The command `python -m training.evaluate`: measure agents on a suite of targets, resumably and in parallel."""
 
-import errno
-import io
 import json
 import sys
 from pathlib import Path
@@ -9,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from agents.commands.running import FAILURE, INTERRUPTED, run_command
+from agents.commands.running import FAILURE, TOLD, run_command
+from agents.commands.screen import say
 from autopoly_env.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -95,7 +94,7 @@ def evaluate(
         run_suite(found, folder, machines, only=only, shard=part, resume=resume, fresh=fresh, quiet=quiet)
     except KeyboardInterrupt:
         print(f"stopped by Ctrl-C; what was done is in {folder}: go on with --resume", file=sys.stderr)
-        return INTERRUPTED
+        return TOLD
     return _finish(folder, baseline, as_json)
 
 
@@ -146,7 +145,7 @@ def _finish(folder: Path, baseline: str | None, as_json: bool) -> int:
             console.width = PLAIN_WIDTH
         console.print(as_rich(HEADS, lines_of(table)))
         for line in (*table.notes, f"Open {folder / 'table.md'}"):
-            console.print(line, markup=False, highlight=False, emoji=False, soft_wrap=True)
+            say(console, line)
     n_failed = sum(record.outcome is None for record in records)
     if n_failed:
         print(f"{n_failed} of {len(records)} tasks failed: {folder / 'records.jsonl'} says why", file=sys.stderr)
@@ -155,14 +154,7 @@ def _finish(folder: Path, baseline: str | None, as_json: bool) -> int:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; whatever is wrong is told in one line on stderr. Returns the exit code."""
-    try:
-        return run_command(app, arguments, "python -m training.evaluate", stopped="")
-    except OSError as error:
-        if error.errno == errno.EPIPE:
-            raise
-        sys.stdout = io.StringIO()  # so that leaving does not fail on it again
-        print(f"error: cannot print the table ({error.strerror}); it is in the folder of the run", file=sys.stderr)
-        return FAILURE
+    return run_command(app, arguments, "python -m training.evaluate")
 
 
 if __name__ == "__main__":

@@ -12,7 +12,9 @@ from rich.text import Text
 from agents import budget
 from agents.commands.progress import TASK, progress_bar
 from agents.commands.results import Result
+from agents.commands.screen import say
 from autopoly_env.sequence import Lesson
+from autopoly_env.shown import tame, told
 
 COLUMNS = ("r_sm", "r_sc", "r_si", "r_all", "actions", "valid", "blocking_in", "moved", "refits", "seconds")
 FORMATS = (".4f", ".0f", ".0f", ".2f", ".0f", ".2f", ".3f", ".3f", ".0f", ".2f")
@@ -50,8 +52,8 @@ class Report:
 
     def begin(self, name: str) -> None:
         """An image is begun."""
-        self._name = name
-        self._bar.update(TASK, description=name)
+        self._name = tame(name)
+        self._bar.update(TASK, description=self._name)
 
     def progress(self, progress: budget.Progress) -> None:
         """An agent has come this far with it."""
@@ -76,7 +78,7 @@ class Report:
     def failed(self, what: str, problem: str) -> None:
         """Something, most often an image, has failed."""
         self.n_failed += 1
-        problem = " ".join(problem.split())
+        problem = told(problem)
         self._bar.advance(TASK)
         if self._as_json:
             _print_record({"image": what, "error": problem})
@@ -84,7 +86,7 @@ class Report:
 
     def say(self, text: str) -> None:
         """A line on stderr, above the progress bar."""
-        _print_line(self._messages, text)
+        say(self._messages, text)
 
     def finish(self, overview: Path | None) -> None:
         """The work is done: show the table and what else there is to know, last the picture to open."""
@@ -99,11 +101,7 @@ class Report:
         if not self._as_json:
             self._output.print(_table(self._rows))
         for line in lines:
-            _print_line(self._messages if self._as_json else self._output, line)
-
-
-def _print_line(console: Console, text: str) -> None:
-    console.print(text, markup=False, highlight=False, emoji=False, soft_wrap=True)
+            say(self._messages if self._as_json else self._output, line)
 
 
 def _print_record(record: dict[str, Any]) -> None:
@@ -126,7 +124,7 @@ def _table(rows: dict[str, tuple[float, ...]]) -> Table:
     for name, mean, style in zip(COLUMNS, means, MEAN_FORMATS, strict=True):
         table.add_column(name, footer=format(mean, style), justify="right", no_wrap=True)
     for name, row in rows.items():
-        table.add_row(Text(name), *(format(value, style) for value, style in zip(row, FORMATS, strict=True)))
+        table.add_row(Text(tame(name)), *(format(value, style) for value, style in zip(row, FORMATS, strict=True)))
     return table
 
 

@@ -17,12 +17,14 @@ from autopoly_env import viewer
 from autopoly_env.arrays import ByteArray
 from autopoly_env.errors import OutputError
 from autopoly_env.export import contact_sheet, save_html, save_png, to_obj, to_svg
+from autopoly_env.shown import told
 from autopoly_env.silhouette import Silhouette
 
 RESULTS = ("sequence.json", "mesh.obj", "mesh.svg", "steps.png", "player.html")
 OVERVIEW = "overview.png"
 PAGE_SIZE = 3850  # pixels that an overview may have each way
 CELL_SIZE = 256  # pixels of a mesh in it, if that fits
+_MOST_CAPTION = 60  # letters of a name in it
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,7 @@ class Overview:
     def add(self, result: Result, silhouette: Silhouette) -> None:
         """Draw a mesh, its name and its r_all beneath."""
         solution = result.solution
-        caption = f"{result.name}\nr_all {solution.score.total:.2f}"
+        caption = f"{told(result.name, _MOST_CAPTION)}\nr_all {solution.score.total:.2f}"
         self._cells.append(viewer.draw_mesh(solution.mesh, silhouette, size=self._size, caption=caption))
 
     def page(self) -> Image.Image:

@@ -14,6 +14,7 @@ from agents.budget import Budget
 from agents.commands.ctrl_c import CtrlC
 from agents.commands.report import Report
 from agents.commands.results import OVERVIEW, RESULTS, Overview, Result, write_results
+from agents.commands.running import TOLD
 from agents.commands.wishes import NO_WISHES, Wishes
 from agents.contract import solved
 from agents.entry import AgentEntry
@@ -134,10 +135,10 @@ def solve_all(jobs: Sequence[Job], settings: Settings, out: Path, report: Report
             report.finish(_write_overview(overview, out, report))
         except KeyboardInterrupt:
             report.say("aborted by Ctrl-C; the files that were written are whole")
-            return 130
+            return TOLD
     if ctrl_c.n_pressed:
         report.say(f"stopped by Ctrl-C: {n_left} of {len(jobs)} images left")
-        return 130
+        return TOLD
     return 1 if report.n_failed else 0
 
 

@@ -13,6 +13,7 @@ from autopoly_env.export.formats import Export, Format, register_format
 from autopoly_env.files import write_atomically
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.sequence import ConstructionSequence
+from autopoly_env.shown import told
 from autopoly_env.silhouette import Silhouette
 
 BORDER = 24  # pixels around the page
@@ -92,7 +93,7 @@ def _draw_cells(
     scores = [sequence.start_score, *(step.score for step in sequence.steps)]
     cells = []
     for i, (mesh, score) in enumerate(zip(meshes, scores, strict=True)):
-        caption = f"{i}  {operators[i]}\nr_all {score['total']:.2f}   IoU {score['iou']:.3f}"
+        caption = f"{i}  {told(operators[i], 40)}\nr_all {score['total']:.2f}   IoU {score['iou']:.3f}"
         new = viewer.changed(meshes[max(i - 1, 0)], mesh)
         frame = viewer.draw_mesh(mesh, silhouette, size=size, highlight=new, caption=caption)
         cells.append(Image.fromarray(frame))
@@ -117,7 +118,7 @@ def _mark(cell: Image.Image, size: int, word: str, colour: viewer.Colour) -> Non
 
 def _draw_header(sequence: ConstructionSequence, silhouette: Silhouette | None) -> Image.Image:
     """The name of the target, the scores of the best mesh, and what the colours mean; HEADER pixels high."""
-    title = viewer.printable(silhouette.name if silhouette else "construction sequence")
+    title = viewer.printable(told(silhouette.name, 80) if silhouette else "construction sequence")
     facts = _facts(sequence.best_prefix(), len(sequence.steps))
     legend = LEGEND if silhouette else LEGEND[-1:]
     large, medium, small = viewer.font(26), viewer.font(16), viewer.font(13)

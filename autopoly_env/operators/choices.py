@@ -13,6 +13,7 @@ from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators.action import Choice
 from autopoly_env.operators.elements import corner_position, hole_face
 from autopoly_env.operators.holes import HoleChoice
+from autopoly_env.shown import short
 
 ChoiceIds = dict[str, Any]
 
@@ -57,10 +58,10 @@ def _corner_choice_ids(mesh: PolyMesh, _corner: int, choice: Choice) -> ChoiceId
 
 def _corner_choice(mesh: PolyMesh, corner: int, ids: ChoiceIds) -> Choice:
     if ids.keys() != {"to"}:
-        raise SequenceError(f"choice {ids}: expected the vertex to split to, {{'to': id}}")
+        raise SequenceError(f"choice {short(ids)}: expected the vertex to split to, {{'to': id}}")
     to = ids["to"]
     if isinstance(to, bool) or not isinstance(to, int) or to < 0:
-        raise SequenceError(f"choice.to is {_short(to)}; give an id, an integer from 0")
+        raise SequenceError(f"choice.to is {short(to)}; give an id, an integer from 0")
     links = mesh.topology.links
     face = links.faces[corner]
     return links.offsets[face] + corner_position(mesh, face, to)
@@ -93,11 +94,6 @@ def _renamed_hole(ids: ChoiceIds, renaming: Renaming) -> ChoiceIds:
         placed = placed[::-1]
         bridges = [(name, len(placed) - 1 - corner) for name, corner in bridges]
     return {"points": placed, "bridges": bridges}
-
-
-def _short(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 40 else text[:37] + "..."
 
 
 TO_CORNER = ChoiceCodec(_corner_choice_ids, _corner_choice, lambda ids, r: {"to": r.vertex(ids["to"])})

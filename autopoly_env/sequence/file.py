@@ -11,9 +11,12 @@ from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from autopoly_env.arguments import first_defect
 from autopoly_env.errors import MeshError, SequenceError
 from autopoly_env.mesh import PolyMesh, Topology, validate
+from autopoly_env.shown import short
 
 FORMAT = "autopoly-construction-sequence"
 VERSION = 1
+MOST_BYTES = 16_000_000  # of a text
+MOST_CORNERS = 20_000  # of a mesh: what looks for crossings takes time by their square
 SCORE_KEYS = ("iou", "complexity", "self_intersections", "total")
 
 Id = Annotated[int, Field(strict=True, ge=0)]
@@ -84,15 +87,17 @@ def dump_json(settings: dict[str, Any], start: PolyMesh, start_score: Score, ste
 
 def parse_json(text: str) -> tuple[dict[str, Any], PolyMesh, Score, tuple[Step, ...]]:
     """Settings, start mesh, its score and the steps of a text. Raises SequenceError if it is no sequence."""
+    if len(text) > MOST_BYTES:
+        raise SequenceError(f"the text has {len(text)} letters; expected at most {MOST_BYTES}")
     try:
         data = json.loads(text, parse_constant=_refuse_number, parse_float=_finite)
     except (ValueError, RecursionError) as error:
         raise SequenceError(f"not JSON ({_one_line(error)}); give a construction sequence as saved") from None
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         found = data.get("format") if isinstance(data, dict) else data
-        raise SequenceError(f"the format is {_short(found)}, not {FORMAT!r}; give a construction sequence")
+        raise SequenceError(f"the format is {short(found)}, not {FORMAT!r}; give a construction sequence")
     if data.get("version") != VERSION:
-        raise SequenceError(f"the version is {_short(data.get('version'))}; this release reads version {VERSION}")
+        raise SequenceError(f"the version is {short(data.get('version'))}; this release reads version {VERSION}")
     try:
         document = _DOCUMENT.validate_python(data)
     except ValidationError as error:
@@ -126,6 +131,9 @@ def _plain_number(value: object) -> int | float | bool:
 
 
 def _start_mesh(start: _Start) -> PolyMesh:
+    n_corners = sum(len(names) for _, names in start.faces)
+    if n_corners > MOST_CORNERS:
+        raise SequenceError(f"start: its faces have {n_corners} corners; expected at most {MOST_CORNERS}")
     index = {name: v for v, (name, _, _) in enumerate(start.vertices)}
     unknown = [(face, v) for face, names in start.faces for v in names if v not in index]
     if unknown:
@@ -169,8 +177,3 @@ def _refuse_number(name: str) -> NoReturn:
 
 def _one_line(error: BaseException) -> str:
     return " ".join(str(error).split())
-
-
-def _short(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 40 else text[:37] + "..."
