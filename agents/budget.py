@@ -8,6 +8,7 @@ from typing import TypeVar
 
 from agents.solution import Stats
 from autopoly_env.errors import ConfigError
+from autopoly_env.shown import short
 from autopoly_env.simulator import State
 
 _Start = TypeVar("_Start")
@@ -23,8 +24,11 @@ class Budget:
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            if value is not None and not value >= 0:
-                raise ConfigError(f"a budget of {value} {name}: expected at least 0")
+            if value is not None and (name == "seconds" or isinstance(value, int)) and value >= 0:
+                continue
+            if value is not None:
+                kind = "a number" if name == "seconds" else "a whole number"
+                raise ConfigError(f"a budget of {short(value)} {name}: expected {kind} of at least 0")
 
     def share(self, part: float) -> "Budget":
         """A part, 0 to 1, of it."""
@@ -71,10 +75,13 @@ class Meter:
         """A meter for a share, 0 to 1, of what is left."""
         return Meter(self.rest().share(share), whole=self)
 
-    def add(self, states: Sequence[State]) -> None:
-        """Note the states that one step of work produced."""
+    def add(self, states: Sequence[State], n_refits: int = 0) -> None:
+        """Note the states that one step of work produced.
+
+        `n_refits` that the simulator has counted meanwhile are more than those of the states where some had no room.
+        """
         best = max((state.score.total for state in states), default=float("-inf"))
-        self.count(sum(state.n_refits for state in states), best)
+        self.count(max(n_refits, sum(state.n_refits for state in states)), best)
 
     def add_simulation(self, n_nodes: int) -> None:
         """Note a simulation that made so many new nodes, before what it did is added or counted."""

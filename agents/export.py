@@ -1,5 +1,6 @@
 """The command `python -m agents.export`: construction sequences as pages, drawings, meshes, pictures and scripts."""
 
+import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -114,7 +115,7 @@ def main(arguments: list[str] | None = None) -> int:
 def _choose(to: str | None, out: Path | None, n: int) -> Format:
     """The format of `n` sequences: by its name, or by the ending of --out. Raises ConfigError if they contradict."""
     named = None if to is None else find_format(to)
-    if out is None or not out.suffix or out.is_dir():
+    if out is None or not out.suffix or os.path.isdir(out):
         return named or find_format(DEFAULT)
     if n > 1:  # to go into a folder, which may have a dot in its name
         if out.suffix.lower() in {suffix for other in formats().values() for suffix in other.suffixes}:
@@ -137,7 +138,7 @@ def _write(made: Format, export: Export, goal: Path) -> None:
     except Exception as error:  # whatever it is, the other sequences can be written
         what = described(error, str(getattr(made.write, "__module__", "")))
         raise OutputError(f"{goal}: the writer of {made.name} failed: {what}") from error
-    if not goal.exists():
+    if not os.path.exists(goal):
         raise OutputError(f"{goal}: the writer of {made.name} made no such file")
 
 
@@ -158,8 +159,8 @@ def _name_outputs(sources: list[Path], out: Path | None, suffix: str) -> Iterato
     taken = {source.resolve() for source in sources}
     for source in sources:
         if out is None:
-            goal = source.with_suffix(suffix)
-        elif len(sources) == 1 and out.suffix and not out.is_dir():
+            goal = source.with_suffix(suffix) if source.name else source / f"sequence{suffix}"
+        elif len(sources) == 1 and out.suffix and not os.path.isdir(out):
             goal = out
         else:
             name = source.resolve().parent.name if source.stem == "sequence" else source.stem

@@ -2,12 +2,14 @@
 
 import json
 import os
+from collections.abc import Iterable, Iterator
+from dataclasses import is_dataclass
 from typing import Any, TypeVar
 
 import yaml
 from pydantic import TypeAdapter, ValidationError
 
-from autopoly_env.arguments import first_defect
+from autopoly_env.arguments import LARGEST, first_defect
 from autopoly_env.errors import ConfigError
 from autopoly_env.files import read_text
 from autopoly_env.shown import short, told
@@ -118,11 +120,31 @@ def _value(written: str, where: str) -> Any:
 def validated(kind: type[_Config], values: dict[str, Any], what: str = "") -> _Config:
     """A config of a dataclass from plain values.
 
-    Raises ConfigError for the first value that does not fit, its message beginning with `what` and the value's key;
-    errors of the dataclass itself come as they are.
+    Raises ConfigError for the first value that does not fit or is no finite number of 64 bits, its message beginning
+    with `what` and the value's key; errors of the dataclass itself come as they are.
     """
     try:
-        return TypeAdapter(kind).validate_python(values)
+        config = TypeAdapter(kind).validate_python(values)
     except ValidationError as error:
         defect = first_defect(error)
         raise ConfigError(f"{what}{defect}, got {short(defect.value)}") from None
+    for key, number in _numbers_in(config):
+        if not -LARGEST <= number <= LARGEST:
+            raise ConfigError(f"{what}{key}: expected a finite number of at most 64 bits, got {short(number)}")
+    return config
+
+
+def _numbers_in(value: Any, key: str = "") -> Iterator[tuple[str, int | float]]:
+    """All numbers of a config, with their dotted keys; what is no plain value or dataclass is passed over."""
+    if isinstance(value, int | float):
+        yield key, value
+        return
+    inner: Iterable[tuple[Any, Any]] = ()
+    if is_dataclass(value):
+        inner = vars(value).items()
+    elif isinstance(value, dict):
+        inner = value.items()
+    elif isinstance(value, list | tuple):
+        inner = enumerate(value)
+    for name, one in inner:
+        yield from _numbers_in(one, f"{key}.{name}" if key else str(name))

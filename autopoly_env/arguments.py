@@ -1,5 +1,7 @@
 """Checks of values that people type or files hold, with errors that say what is allowed."""
 
+import math
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, SupportsFloat, TypeVar
 
@@ -13,6 +15,8 @@ if TYPE_CHECKING:
 
 _Value = TypeVar("_Value")
 
+LARGEST = 2**63 - 1  # whole number that kernels and random numbers take
+
 
 def one_of(name: str, value: _Value, allowed: tuple[_Value, ...]) -> _Value:
     """The value, if it is allowed. Raises ConfigError otherwise."""
@@ -21,18 +25,23 @@ def one_of(name: str, value: _Value, allowed: tuple[_Value, ...]) -> _Value:
     return value
 
 
-def whole(name: str, value: Any, at_least: int = 0) -> int:
-    """The value, a whole number of at least so much. Raises ConfigError otherwise."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < at_least:
-        raise ConfigError(f"{name}={short(value)}: expected a whole number of at least {at_least}")
+def whole(name: str, value: Any, at_least: int = 0, at_most: int = LARGEST) -> int:
+    """The value, a whole number of at least and at most so much. Raises ConfigError otherwise."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not at_least <= value <= at_most:
+        bounds = f"of at least {at_least}" if at_most == LARGEST else f"from {at_least} to {at_most}"
+        raise ConfigError(f"{name}={short(value)}: expected a whole number {bounds}")
     return int(value)
 
 
 def number(name: str, value: Any) -> float:
     """The value, a finite number. Raises ConfigError otherwise."""
-    if isinstance(value, bool) or not isinstance(value, SupportsFloat) or not np.isfinite(float(value)):
+    found = float("nan")
+    if not isinstance(value, bool) and isinstance(value, SupportsFloat):
+        with suppress(OverflowError, TypeError, ValueError):
+            found = float(value)
+    if not math.isfinite(found):
         raise ConfigError(f"{name}={short(value)}: expected a number")
-    return float(value)
+    return found
 
 
 @dataclass(frozen=True)

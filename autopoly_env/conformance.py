@@ -15,7 +15,7 @@ import numpy as np
 
 from autopoly_env.errors import AutoPolyError, ConfigError, ConformanceError, IllegalActionError
 from autopoly_env.export.player import describe_step
-from autopoly_env.mesh import PolyMesh, images_of, is_valid
+from autopoly_env.mesh import PolyMesh, defects_of, images_of, is_valid
 from autopoly_env.operators import OPERATORS, STOP, Action, Operator, Start
 from autopoly_env.operators.operator import Mirroring
 from autopoly_env.raster import coverage
@@ -54,9 +54,10 @@ def check_operator(operator: Operator, meshes: Iterable[PolyMesh] | None = None)
 def check_simulator(simulator: Simulator, n_steps: int = 30, seed: int = 0) -> None:
     """Check a simulator by playing `n_steps` random actions.
 
-    Rules: STOP is legal until the end, nothing after it; every action it calls legal works, another raises
-    IllegalActionError; the same state and action give the same state, alone and in `transition_all`; a transition
-    leaves the state it starts from as it was; scores are those of the meshes; states pickle; `max_steps` is kept.
+    Rules: STOP is legal until the end, nothing after it; every action it calls legal works or has no room, another
+    raises IllegalActionError; no transition brings a crossing, or a flipped or empty face; the same state and action
+    give the same state, alone and in `transition_all`; a transition leaves the state it starts from as it was, and its
+    refits are counted; scores are those of the meshes; states pickle; `max_steps` is kept.
     """
     rng = np.random.default_rng(seed)
     state = simulator.initial()
@@ -102,9 +103,9 @@ def check_target_source(source: TargetSource, n: int = 10) -> None:
 def check_env(env: Any, n_steps: int = 60, seed: int = 0) -> None:
     """Check of an AutoPoly environment, wrapped or not, what Gymnasium's own `check_env` does not.
 
-    Rules: STOP is always legal; an action that the mask allows is never invalid, one that it forbids always is and
-    leaves the shape alone; infos have the same keys and types at every step; restoring a state and playing on gives
-    the same trace, bit for bit, and so does a copy of the state that was pickled.
+    Rules: STOP is always legal; an action that the mask forbids is invalid and leaves the shape alone; so does one that
+    it allows and that has no room, which it forbids from then on; infos have the same keys and types at every step;
+    restoring a state and playing on gives the same trace, bit for bit, and so does a copy of the state from a pickle.
     """
     rng = np.random.default_rng(seed)
     _, info = env.reset(seed=seed)
@@ -239,8 +240,15 @@ def _check_mirror(operator: Operator, mesh: PolyMesh, element: int, where: str) 
 
 def _checked_transition(simulator: Simulator, state: State, action: Any, where: str) -> State:
     where = f"{where}, {action.operator} {action.element}"
-    before = pickle.dumps(state)
-    after = simulator.transition(state, action)
+    before, n_refits = pickle.dumps(state), simulator.n_refits
+    try:
+        after = simulator.transition(state, action)
+    except IllegalActionError:
+        _require(not simulator.transition_all(state, [action]), f"{where} has no room in transition alone")
+        return state
+    _require(simulator.n_refits - n_refits == after.n_refits, f"{where}: the simulator does not count its refits")
+    worse = any(now > then for now, then in zip(defects_of(after.mesh), defects_of(state.mesh), strict=True))
+    _require(not worse, f"{where}: edges cross, or a face is flipped or empty, that was not before")
     _require(_same_state(after, simulator.transition(state, action)), f"{where} does not give the same state twice")
     (batched,) = simulator.transition_all(state, [action]) or (None,)
     _require(batched is not None and _same_state(after, batched), f"{where} gives another state in transition_all")
@@ -267,8 +275,10 @@ def _checked_step(env: Any, action: int, before: dict[str, Any], where: str) -> 
     types = [{name: type(value) for name, value in one.items()} for one in (before, info)]
     _require(types[0] == types[1], f"{where}: the infos have other keys or types than before")
     illegal = mask[action] == 0
-    _require(info["invalid_action"] == illegal, f"{where}: invalid_action is wrong about action {action}")
-    _require(not illegal or info["r_all"] == before["r_all"], f"{where}: an illegal action changed the shape")
+    invalid = info["invalid_action"]
+    known = illegal or info["action_mask"][action] == 0  # which has no room, as is known now
+    _require(invalid == illegal or (invalid and known), f"{where}: invalid_action is wrong about action {action}")
+    _require(not invalid or info["r_all"] == before["r_all"], f"{where}: an illegal action changed the shape")
     return tuple(outcome)
 
 

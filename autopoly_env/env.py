@@ -37,7 +37,8 @@ class EnvState:
     previous: PolyMesh | None  # the mesh one step earlier; None at the start
     best_r_all: float  # since the start
     action: str  # of the last step, in words
-    illegal: bool  # whether that was illegal
+    illegal: bool  # whether that was illegal, or had no room
+    no_room: tuple[int, ...] = ()  # actions that the mesh as it is has proved to have no room for
 
 
 class AutoPolyEnv(gymnasium.Env[Observation, Any]):
@@ -68,7 +69,8 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
 
     `Discrete`: 0 is STOP, then each operator has one index for every element that a mesh of N vertices may have.
     `info["action_mask"]` (int8) and `action_masks()` (bool) say which are legal; an operator that would leave the
-    padding is not. An illegal action is a step in which nothing is done (`info["invalid_action"]`).
+    padding is not. An illegal action is a step in which nothing is done (`info["invalid_action"]`). So is, rarely, a
+    legal one that has no room, which is known once it is tried; the mask forbids it from then on.
 
     ## Reward
 
@@ -193,7 +195,8 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
             raise EpisodeError(f"a step after the end of the episode ({before.done}): call reset() first")
         chosen = self.codec.decode(index)
         after = (yield from self._transition(before, chosen)) if self._legal_mask()[index] else None
-        self._advance(after or self._simulator.idle(before), describe(before.mesh, chosen), illegal=after is None)
+        no_room = (index,) if after is None and self._legal_mask()[index] else ()
+        self._advance(after or self._simulator.idle(before), describe(before.mesh, chosen), after is None, no_room)
         done = self.state.done
         return self._observation(), self._reward(before), done in ("stop", "matched"), done == "max_steps", self._info()
 
@@ -288,10 +291,10 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
         except IllegalActionError:
             return None
 
-    def _advance(self, state: State, action: str, illegal: bool) -> None:
+    def _advance(self, state: State, action: str, illegal: bool, no_room: tuple[int, ...]) -> None:
         now = self._current()
-        best = max(now.best_r_all, state.score.total)
-        self._episode = EnvState(self._rules, now.silhouette, state, now.state.mesh, best, action, illegal)
+        best, known = max(now.best_r_all, state.score.total), (*now.no_room, *no_room) if illegal else ()
+        self._episode = EnvState(self._rules, now.silhouette, state, now.state.mesh, best, action, illegal, known)
         self._mask = None
 
     def _reward(self, before: State) -> float:
@@ -302,6 +305,7 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
     def _legal_mask(self) -> BoolArray:
         if self._mask is None:
             self._mask = self.codec.legal_mask(self.state.mesh)
+            self._mask[list(self._current().no_room)] = False
         return self._mask
 
     def _observation(self) -> Observation:

@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 import shapely
 
+from autopoly_env.arguments import number, whole
 from autopoly_env.arrays import BoolArray
 from autopoly_env.compute import Job, Routine, map_threads, run
 from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.guidance import Guidance, ImportanceSource, importance_settings, weighted
 from autopoly_env.mesh import PolyMesh, defects_of
-from autopoly_env.operators import STOP, Action, Choice, Halfway, Operator, legal_actions, preset
+from autopoly_env.operators import STOP, Action, Choice, Halfway, Operator, describe, legal_actions, preset
 from autopoly_env.placement import Disagreement, Trial, tried
 from autopoly_env.refit import FROM_AFAR, LOCAL, THOROUGH, RefitConfig, RefitTarget, holding, refit, tune
 from autopoly_env.score import Score, ScoreWeights, score
@@ -25,6 +26,7 @@ from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence.lesson import share_moved
 from autopoly_env.silhouette import Silhouette
 
+MOST_CORNERS = 2000  # of a mesh to start from: a refit takes memory by their square
 POLISH_RESOLUTION = 512  # of the finest refit; a score may be finer
 _N_REFINED = 3  # refits at it, each towards more than the IoU of the one before
 _BACKGROUND_STEPS = 16  # between weights 0 and 1, so that few targets are prepared
@@ -76,11 +78,10 @@ class Simulator:
         locked: Collection[int] = (),
         symmetry: bool | float | None = None,
     ) -> None:
+        resolution, max_steps = whole("resolution", resolution), whole("max_steps", max_steps)
         if not 8 <= resolution <= 1024:
             raise ConfigError(f"resolution {resolution}: expected 8 to 1024 pixels a side")
-        if max_steps < 0:
-            raise ConfigError(f"max_steps {max_steps}: expected at least 0")
-        if not 0.0 < match_threshold <= 1.0:
+        if not 0.0 < number("match_threshold", match_threshold) <= 1.0:
             raise ConfigError(f"match_threshold {match_threshold}: expected an IoU above 0, at most 1")
         self.silhouette = silhouette if importance is None else weighted(silhouette, importance)
         self.guidance = Guidance.of(self.silhouette, start, locked, symmetry)
@@ -91,6 +92,7 @@ class Simulator:
         self.match_threshold = match_threshold
         self._target = self.silhouette.target(resolution)
         self.finest = min(self.silhouette.resolution, POLISH_RESOLUTION)  # pixels a side at which meshes are finished
+        self.n_refits = 0  # that its transitions and initial states have taken so far, whoever asked for them
         self._refit_targets: dict[tuple[int, float], RefitTarget] = {}
 
     def __getstate__(self) -> dict[str, Any]:
@@ -137,9 +139,13 @@ class Simulator:
         """`initial` as a routine, whose jobs are the refits."""
         mesh = self.guidance.start if mesh is None else mesh
         if mesh is not None:
+            n_corners = sum(map(len, mesh.faces))
+            if n_corners > MOST_CORNERS:
+                raise ConfigError(f"the start mesh has {n_corners} corners: expected at most {MOST_CORNERS}")
             self.guidance.check_symmetric(mesh)
             return self._ended(State(mesh, self.score(mesh), n_refits=0))
         fits = yield [self._refit_job(box, FROM_AFAR, 1.0) for box in self._bounding_boxes()]
+        self.n_refits += len(fits)
         best = max((fit.mesh for fit in fits), key=lambda fit: self.score(fit).total)
         return self._ended(State(best, self.score(best), n_refits=len(fits)))
 
@@ -185,7 +191,11 @@ class Simulator:
         return score(mesh, self.silhouette.target(self.silhouette.resolution), self.weights)
 
     def legal_actions(self, state: State) -> list[Action]:
-        """What may be done next; STOP first, and nothing once it is over."""
+        """What may be done next; STOP first, and nothing once it is over.
+
+        A few of these turn out to have no room once they are tried: `transition` refuses them, `transition_all` leaves
+        them out.
+        """
         if state.done:
             return []
         actions = [a for a in legal_actions(state.mesh, self.operators) if self.guidance.allows(state.mesh, a)]
@@ -195,7 +205,11 @@ class Simulator:
         return [STOP, *actions]
 
     def transition(self, state: State, action: Action) -> State:
-        """The state after one action and its refit. Raises IllegalActionError where the action is not legal."""
+        """The state after one action and its refit.
+
+        It has no crossing, and no flipped or empty face, that the state before has not. Raises IllegalActionError where
+        the action is not legal, and where even the refit leaves no room for it.
+        """
         return run(self.transition_routine(state, action))
 
     def transition_routine(self, state: State, action: Action) -> Routine[State]:
@@ -205,8 +219,14 @@ class Simulator:
         if action == STOP:
             return replace(state, done="stop", action=STOP, choice=None, n_refits=0, halfway=None)
         self._check_operator(action)
-        trial = self._tried(Disagreement(state.mesh, self.silhouette), action)
-        return (yield from self._refitted(state, trial))
+        disagreement = Disagreement(state.mesh, self.silhouette)
+        trial = self._tried(disagreement, action)
+        after = yield from self._refitted(state, trial)
+        self.n_refits += after.n_refits
+        if not _is_as_sane(after, disagreement):
+            what = describe(state.mesh, action)
+            raise IllegalActionError(f"{what} has no room: edges would cross, or a face be flipped or empty")
+        return after
 
     def idle(self, state: State) -> State:
         """The state one step later, nothing done: what a player that asks for an illegal action gets."""
@@ -215,8 +235,8 @@ class Simulator:
     def transition_all(self, state: State, actions: Sequence[Action] | None = None) -> list[State]:
         """`transition` of all (or the given) actions but STOP, on all cores, in their order.
 
-        Actions that turn out to have no room, such as a hole that fits nowhere, are left out. Raises
-        IllegalActionError for operators that are not the simulator's.
+        Actions that turn out to have no room, such as a hole that fits nowhere, are left out, though their refits
+        count. Raises IllegalActionError for operators that are not the simulator's.
         """
         if state.done:
             return []
@@ -226,7 +246,9 @@ class Simulator:
                 self._check_operator(action)
         disagreement = Disagreement(state.mesh, self.silhouette)
         trials = self._possible(disagreement, [action for action in chosen if action != STOP])
-        return map_threads(lambda trial: run(self._refitted(state, trial)), trials)
+        made = map_threads(lambda trial: run(self._refitted(state, trial)), trials)
+        self.n_refits += sum(after.n_refits for after in made)
+        return [after for after in made if _is_as_sane(after, disagreement)]
 
     def _check_operator(self, action: Action) -> None:
         if action.operator not in self.operators:
@@ -303,6 +325,11 @@ class Simulator:
         refined = self.refine(mesh)
         tuned = tune(refined, self.silhouette.target(self.finest), self.guidance.bonds(mesh))
         return max((refined, tuned), key=lambda candidate: self.final_score(candidate).total)
+
+
+def _is_as_sane(after: State, before: Disagreement) -> bool:
+    """Whether a transition has brought no crossing, and no flipped or empty face."""
+    return all(now <= then for now, then in zip(defects_of(after.mesh), before.defects, strict=True))
 
 
 def _ends_changed(before: PolyMesh, after: PolyMesh) -> set[int]:

@@ -37,14 +37,15 @@ class ChoiceCodec:
 
 
 _Id = Annotated[int, Field(strict=True, ge=0)]
-_Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+_FARTHEST = 1e6  # unit square, as of vertices
+_Place = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-_FARTHEST, le=_FARTHEST)]
 
 
 @dataclass(frozen=True)
 class _Hole:
     __pydantic_config__ = ConfigDict(extra="forbid")
 
-    points: tuple[tuple[_Number, _Number], ...]
+    points: tuple[tuple[_Place, _Place], ...]
     bridges: tuple[tuple[_Id, _Id], tuple[_Id, _Id]]
 
 

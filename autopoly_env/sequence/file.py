@@ -17,11 +17,13 @@ FORMAT = "autopoly-construction-sequence"
 VERSION = 1
 MOST_BYTES = 16_000_000  # of a text
 MOST_CORNERS = 20_000  # of a mesh: what looks for crossings takes time by their square
+FARTHEST = 1e6  # unit square, of a coordinate: farther out nothing can be computed with
 SCORE_KEYS = ("iou", "complexity", "self_intersections", "total")
 
-Id = Annotated[int, Field(strict=True, ge=0)]
+Id = Annotated[int, Field(strict=True, ge=0, le=2**53)]  # as far as every reader of JSON counts exactly
+Place = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-FARTHEST, le=FARTHEST)]
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Score = dict[str, Annotated[int, Field(strict=True)] | Number]  # at least SCORE_KEYS
+Score = dict[str, Annotated[int, Field(strict=True, ge=-(2**53), le=2**53)] | Number]  # at least SCORE_KEYS
 _STRICT = ConfigDict(extra="forbid")
 
 
@@ -41,7 +43,7 @@ class Step:
     choice: dict[str, Any] | None
     created: dict[str, list[Id]]  # {"vertices": [...], "faces": [...]}
     removed: dict[str, list[Id]]
-    moved: tuple[tuple[Id, Number, Number], ...]  # (vertex, x, y) wherever the operator itself had put it elsewhere
+    moved: tuple[tuple[Id, Place, Place], ...]  # (vertex, x, y) wherever the operator itself had put it elsewhere
     score: Score
 
 
@@ -49,7 +51,7 @@ class Step:
 class _Start:
     __pydantic_config__ = _STRICT
 
-    vertices: list[tuple[Id, Number, Number]]
+    vertices: list[tuple[Id, Place, Place]]
     faces: list[tuple[Id, list[Id]]]
     next_vertex_id: Id
     next_face_id: Id
@@ -61,7 +63,7 @@ class _Document:
     __pydantic_config__ = _STRICT
 
     format: str
-    version: int
+    version: Annotated[int, Field(strict=True)]
     settings: dict[str, Any]
     start: _Start
     steps: tuple[Step, ...]
@@ -96,7 +98,7 @@ def parse_json(text: str) -> tuple[dict[str, Any], PolyMesh, Score, tuple[Step, 
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         found = data.get("format") if isinstance(data, dict) else data
         raise SequenceError(f"the format is {short(found)}, not {FORMAT!r}; give a construction sequence")
-    if data.get("version") != VERSION:
+    if data.get("version") != VERSION or type(data["version"]) is not int:
         raise SequenceError(f"the version is {short(data.get('version'))}; this release reads version {VERSION}")
     try:
         document = _DOCUMENT.validate_python(data)
@@ -109,10 +111,15 @@ def parse_json(text: str) -> tuple[dict[str, Any], PolyMesh, Score, tuple[Step, 
 
 
 def check_score(score: Score, where: str) -> None:
-    """Raise SequenceError if an entry of SCORE_KEYS is missing."""
+    """Raise SequenceError if an entry of SCORE_KEYS is missing, or out of its range."""
     missing = [key for key in SCORE_KEYS if key not in score]
     if missing:
         raise SequenceError(f"{where}: the score has no {missing[0]!r}; give {', '.join(SCORE_KEYS)}")
+    if not 0.0 <= score["iou"] <= 1.0:
+        raise SequenceError(f"{where}: the score's iou is {score['iou']}; expected 0 to 1")
+    for key in ("complexity", "self_intersections"):
+        if not score[key] >= 0 or score[key] != int(score[key]):
+            raise SequenceError(f"{where}: the score's {key} is {score[key]}; expected a whole number from 0")
 
 
 def plain_json(value: object) -> str:
