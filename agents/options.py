@@ -4,6 +4,7 @@ import json
 import os
 from collections.abc import Iterable, Iterator
 from dataclasses import is_dataclass
+from functools import cache
 from typing import Any, TypeVar
 
 import yaml
@@ -117,6 +118,12 @@ def _value(written: str, where: str) -> Any:
         raise ConfigError(f"{where}: the value is not YAML; quote it or correct it") from None
 
 
+@cache
+def _adapter(kind: type[Any]) -> TypeAdapter[Any]:
+    """What validates values of a dataclass: it takes longer to make than to use."""
+    return TypeAdapter(kind)
+
+
 def validated(kind: type[_Config], values: dict[str, Any], what: str = "") -> _Config:
     """A config of a dataclass from plain values.
 
@@ -124,7 +131,7 @@ def validated(kind: type[_Config], values: dict[str, Any], what: str = "") -> _C
     with `what` and the value's key; errors of the dataclass itself come as they are.
     """
     try:
-        config = TypeAdapter(kind).validate_python(values)
+        config: _Config = _adapter(kind).validate_python(values)
     except ValidationError as error:
         defect = first_defect(error)
         raise ConfigError(f"{what}{defect}, got {short(defect.value)}") from None

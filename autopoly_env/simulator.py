@@ -16,7 +16,7 @@ from autopoly_env.arguments import number, whole
 from autopoly_env.arrays import BoolArray
 from autopoly_env.compute import Job, Routine, map_threads, run
 from autopoly_env.errors import ConfigError, IllegalActionError
-from autopoly_env.guidance import Guidance, ImportanceSource, importance_settings, weighted
+from autopoly_env.guidance import MOST_CORNERS, Guidance, ImportanceSource, importance_settings, weighted
 from autopoly_env.mesh import PolyMesh, defects_of
 from autopoly_env.operators import STOP, Action, Choice, Halfway, Operator, describe, legal_actions, preset
 from autopoly_env.placement import Disagreement, Trial, tried
@@ -26,7 +26,6 @@ from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence.lesson import share_moved
 from autopoly_env.silhouette import Silhouette
 
-MOST_CORNERS = 2000  # of a mesh to start from: a refit takes memory by their square
 POLISH_RESOLUTION = 512  # of the finest refit; a score may be finer
 _N_REFINED = 3  # refits at it, each towards more than the IoU of the one before
 _BACKGROUND_STEPS = 16  # between weights 0 and 1, so that few targets are prepared

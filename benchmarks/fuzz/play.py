@@ -1,0 +1,59 @@
+"""Random play: no legal action ends with a crossing, or with a flipped or empty face, that was not there before."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from autopoly_env.errors import IllegalActionError
+from autopoly_env.mesh import defects_of
+from autopoly_env.operators import Action
+from autopoly_env.simulator import Simulator
+from autopoly_env.targets import ConstructionTargets, ObjectTargets, TargetSource
+
+TARGET_RESOLUTION = 64  # pixels a side
+RESOLUTION = 32  # of refits: small, for there are to be many episodes
+N_STEPS = 20  # of an episode
+N_SIDES = 40  # vertices of a mesh from which on an episode ends, for time's sake
+
+
+@dataclass
+class Played:
+    """What so many episodes came to."""
+
+    n_episodes: int = 0
+    n_steps: int = 0
+    n_without_room: int = 0  # actions that were tried and refused
+    n_crossed: int = 0  # states with a crossing
+    n_flipped: int = 0  # states with a flipped or empty face
+
+    def __add__(self, other: "Played") -> "Played":
+        return Played(*(a + b for a, b in zip(vars(self).values(), vars(other).values(), strict=True)))
+
+
+def play(operators: str, seed: int) -> Played:
+    """One episode of random actions with a preset; each operator is as likely, whatever the number of its elements."""
+    rng = np.random.default_rng(seed)
+    source: TargetSource = (ConstructionTargets, ObjectTargets)[seed % 2](resolution=TARGET_RESOLUTION)
+    simulator = Simulator(source.sample(seed), operators=operators, resolution=RESOLUTION, max_steps=N_STEPS)
+    state, played = simulator.initial(), Played(n_episodes=1)
+    while not state.done and len(state.mesh.vertices) < N_SIDES:
+        by_operator: dict[str, list[Action]] = {}
+        for action in simulator.legal_actions(state)[1:]:
+            by_operator.setdefault(action.operator, []).append(action)
+        if not by_operator:
+            break
+        actions = by_operator[sorted(by_operator)[rng.integers(len(by_operator))]]
+        try:
+            state = simulator.transition(state, actions[rng.integers(len(actions))])
+        except IllegalActionError:
+            played.n_without_room += 1
+            state = simulator.idle(state)
+            continue
+        crossings, flipped = defects_of(state.mesh)
+        played += Played(0, 1, 0, crossings > 0, flipped > 0)
+    return played
+
+
+def play_many(operators: str, n: int, seed: int) -> Played:
+    """Episodes number `seed` to `seed` + n - 1."""
+    return sum((play(operators, seed + k) for k in range(n)), Played())
