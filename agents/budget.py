@@ -14,9 +14,17 @@ from autopoly_env.simulator import State
 _Start = TypeVar("_Start")
 
 
+# A tree search is bounded also where its states cost no refit, as those of WarpNet, or nothing new is made.
+STATES_A_REFIT = 200  # states of a tree, and simulations, for each refit of the budget
+MOST_STATES = 200_000  # whatever the budget is: about 2 GB
+
+
 @dataclass(frozen=True)
 class Budget:
-    """How much work a solve may do; None is no limit. It is looked at between steps: one may overrun it."""
+    """How much work a solve may do; None is no limit. It is looked at between steps: one may overrun it.
+
+    A tree has at most `MOST_STATES` states, and `STATES_A_REFIT` for each refit where these are limited.
+    """
 
     refits: int | None = None
     seconds: float | None = None
@@ -59,6 +67,8 @@ class Meter:
         self, budget: Budget, on_progress: Callable[[Progress], None] | None = None, whole: "Meter | None" = None
     ) -> None:
         self._budget = budget
+        n_refits = MOST_STATES if budget.refits is None else STATES_A_REFIT * budget.refits
+        self._most_states = min(MOST_STATES, n_refits)
         self._on_progress = on_progress
         self._whole = whole
         self._began = time.perf_counter()
@@ -113,6 +123,8 @@ class Meter:
             if limit is not None and used[name] >= limit:
                 self.stopped_by = name
                 break
+        if max(self._n_nodes, self._n_simulations) >= self._most_states:
+            self.stopped_by = "states"
         if self._whole is not None and self._whole.spent():
             self.stopped_by = self._whole.stopped_by
         return self.stopped_by != "finished"

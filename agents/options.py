@@ -130,8 +130,9 @@ def validated(kind: type[_Config], values: dict[str, Any], what: str = "") -> _C
     Raises ConfigError for the first value that does not fit or is no finite number of 64 bits, its message beginning
     with `what` and the value's key; errors of the dataclass itself come as they are.
     """
+    hashable: Any = kind  # as classes are, which mypy does not believe
     try:
-        config: _Config = _adapter(kind).validate_python(values)
+        config: _Config = _adapter(hashable).validate_python(values)
     except ValidationError as error:
         defect = first_defect(error)
         raise ConfigError(f"{what}{defect}, got {short(defect.value)}") from None

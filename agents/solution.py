@@ -16,8 +16,8 @@ class Stats:
 
     n_refits: int
     seconds: float
-    # "finished", "interrupted", or what was spent: "refits", "seconds" or "simulations"; OVER_BUDGET where an agent did
-    # more refits than it was given, and did not count them
+    # "finished", "interrupted", or what was spent: "refits", "seconds", "simulations" or "states"; OVER_BUDGET where an
+    # agent did more refits than it was given, and did not count them
     stopped_by: str
 
 

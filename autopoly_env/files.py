@@ -9,6 +9,14 @@ from pathlib import Path
 
 from autopoly_env.errors import OutputError
 
+_MOST_STEM = 200  # bytes: what is put behind it has to fit into the 255 of a file's name
+
+
+def file_stem(path: Path) -> str:
+    """A name for what comes of a file: its own without the ending, as text, not hidden, not empty and not too long."""
+    stem = path.stem.encode("utf-8", "replace").decode().lstrip(".")
+    return stem.encode()[:_MOST_STEM].decode("utf-8", "ignore") or "image"
+
 
 def read_text(path: str | os.PathLike[str], most_bytes: int) -> str:
     """The text, in UTF-8, of an ordinary file of at most `most_bytes`.

@@ -22,6 +22,7 @@ from agents.registry import find_agent
 from autopoly_env.compute import n_threads
 from autopoly_env.errors import AutoPolyError, ConfigError
 from autopoly_env.export import save_png
+from autopoly_env.files import file_stem
 from autopoly_env.outside import described
 from autopoly_env.score import ScoreWeights
 from autopoly_env.silhouette import Silhouette, load_silhouette
@@ -111,7 +112,7 @@ def name_jobs(images: Sequence[Path], out: Path) -> list[Job]:
     taken = {OVERVIEW: OVERVIEW}
     jobs = []
     for image in images:
-        stem = image.stem.encode("utf-8", "replace").decode().lstrip(".") or "image"
+        stem = file_stem(image)
         name, count = stem, 1
         while name.casefold() in taken:
             count += 1
@@ -186,7 +187,7 @@ def _solve(job: Job, settings: Settings, out: Path, report: Report, ctrl_c: Ctrl
     silhouette = load_silhouette(job.image, name=job.name)
     simulator, agent = settings.simulator(silhouette), settings.new_agent()
     with ctrl_c.searching():
-        solution = solved(agent, simulator, settings.budget, report.progress)
+        solution = solved(agent, simulator, settings.budget, ctrl_c.heeding(report.progress))
     sequence = solution.sequence
     sequence = replace(sequence, settings={**sequence.settings, **settings.as_dict()})
     solution = replace(solution, sequence=sequence)

@@ -64,7 +64,7 @@ def sequence(rng: Rng) -> None:
         weights_of(found.settings)
         for write in (to_html, sequence_to_svg, blender_script, Lesson.of, lambda one: to_obj(one.final())):
             with contextlib.suppress(SequenceError):
-                write(found)  # type: ignore[operator]
+                write(found)
         found.diff(found.trim(0))
 
 

@@ -1,19 +1,22 @@
 """Random play: no legal action ends with a crossing, or with a flipped or empty face, that was not there before."""
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from autopoly_env.errors import IllegalActionError
 from autopoly_env.mesh import defects_of
 from autopoly_env.operators import Action
+from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator
 from autopoly_env.targets import ConstructionTargets, ObjectTargets, TargetSource
 
 TARGET_RESOLUTION = 64  # pixels a side
-RESOLUTION = 32  # of refits: small, for there are to be many episodes
-N_STEPS = 20  # of an episode
-N_SIDES = 40  # vertices of a mesh from which on an episode ends, for time's sake
+RESOLUTION = 16  # of refits: small, for there are to be many episodes
+N_TARGETS = 64  # that the episodes take in turn
+N_STEPS = 16  # of an episode
+N_VERTICES = 24  # of a mesh, from which on an episode ends, for time's sake
 
 
 @dataclass
@@ -30,13 +33,19 @@ class Played:
         return Played(*(a + b for a, b in zip(vars(self).values(), vars(other).values(), strict=True)))
 
 
+@cache
+def _target(number: int) -> Silhouette:
+    """Constructions and drawn objects, in turn."""
+    source: TargetSource = (ConstructionTargets, ObjectTargets)[number % 2](resolution=TARGET_RESOLUTION)
+    return source.sample(number)
+
+
 def play(operators: str, seed: int) -> Played:
     """One episode of random actions with a preset; each operator is as likely, whatever the number of its elements."""
     rng = np.random.default_rng(seed)
-    source: TargetSource = (ConstructionTargets, ObjectTargets)[seed % 2](resolution=TARGET_RESOLUTION)
-    simulator = Simulator(source.sample(seed), operators=operators, resolution=RESOLUTION, max_steps=N_STEPS)
+    simulator = Simulator(_target(seed % N_TARGETS), operators=operators, resolution=RESOLUTION, max_steps=N_STEPS)
     state, played = simulator.initial(), Played(n_episodes=1)
-    while not state.done and len(state.mesh.vertices) < N_SIDES:
+    while not state.done and len(state.mesh.vertices) < N_VERTICES:
         by_operator: dict[str, list[Action]] = {}
         for action in simulator.legal_actions(state)[1:]:
             by_operator.setdefault(action.operator, []).append(action)

@@ -1,5 +1,6 @@
 """What came of odd inputs, counted: accepted, refused in one tame line, anything else."""
 
+import sys
 import time
 import traceback
 from dataclasses import dataclass, field
@@ -11,6 +12,7 @@ from benchmarks.fuzz.inputs import DOORS
 
 MOST_LETTERS = 400  # of a message
 MOST_BYTES = 6 * 10**9  # of memory
+TOLD_EVERY = 10_000  # inputs
 N_SHOWN = 12  # exceptions of a door that are shown
 
 
@@ -34,12 +36,14 @@ class Tally:
 
 
 def fuzz(n: int, seed: int) -> dict[str, Tally]:
-    """`n` inputs over all doors; each depends on the seed and its number only."""
+    """`n` inputs over all doors; each depends on the seed and its number only. Now and then stderr hears how it goes."""
     tallies = {name: Tally() for name in DOORS} if n else {}
     names = [name for name, (_, share) in DOORS.items() for _ in range(share)]
     for number in range(n):
         name = names[(37 * number) % len(names)]
         try_one(tallies[name], name, seed, number)
+        if number % TOLD_EVERY == TOLD_EVERY - 1:
+            print(table(tallies), file=sys.stderr, flush=True)
     return tallies
 
 
