@@ -36,7 +36,7 @@ class Tally:
 
 
 def fuzz(n: int, seed: int) -> dict[str, Tally]:
-    """`n` inputs over all doors; each depends on the seed and its number only. Now and then stderr hears how it goes."""
+    """`n` inputs over all doors; each depends on the seed and its number only. Now and then stderr hears of it."""
     tallies = {name: Tally() for name in DOORS} if n else {}
     names = [name for name, (_, share) in DOORS.items() for _ in range(share)]
     for number in range(n):
