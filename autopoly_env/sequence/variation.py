@@ -142,7 +142,7 @@ def weights_of(settings: Mapping[str, Any]) -> ScoreWeights:
     """The weights under which a sequence was scored; the default for those that its settings do not tell."""
     default = ScoreWeights()
     told = {name: settings.get(name, value) for name, value in vars(default).items()}
-    if all(isinstance(value, int | float) and 0.0 <= value <= _MOST_WEIGHT for value in told.values()):
+    if all(type(value) in (int, float) and 0.0 <= value <= _MOST_WEIGHT for value in told.values()):
         return ScoreWeights(**told)
     return default
 
