@@ -9,7 +9,8 @@ Each check returns None, or raises ConformanceError naming the rule that was bro
 import pickle
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from functools import wraps
+from typing import Any, ParamSpec
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from autopoly_env.export.player import describe_step
 from autopoly_env.mesh import PolyMesh, defects_of, images_of, is_valid
 from autopoly_env.operators import OPERATORS, STOP, Action, Operator, Start
 from autopoly_env.operators.operator import Mirroring
+from autopoly_env.outside import described
 from autopoly_env.raster import coverage
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence.ids import decoded
@@ -25,11 +27,32 @@ from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator, State
 from autopoly_env.targets import TargetSource
 
+_Checked = ParamSpec("_Checked")
+
+
+def _promising(check: Callable[_Checked, None]) -> Callable[_Checked, None]:
+    """The check, which raises ConformanceError also where the part that is checked raises something unexpected."""
+
+    @wraps(check)
+    def checked(*arguments: _Checked.args, **settings: _Checked.kwargs) -> None:
+        try:
+            check(*arguments, **settings)
+        except AutoPolyError as error:
+            if isinstance(error, ConformanceError):
+                raise
+            raise ConformanceError(f"it raises {type(error).__name__}: {error}") from error
+        except Exception as error:  # whatever somebody else's code may do
+            raise ConformanceError(f"it raises {described(error)}") from error
+
+    return checked
+
+
 _AXIS = 0.5  # of the symmetric ones among the sample meshes
 _LOOK = 32  # pixels a side at which a rendering is looked at
 _NO_SCORE = {"iou": 0.0, "complexity": 0, "self_intersections": 0, "total": 0.0}
 
 
+@_promising
 def check_operator(operator: Operator, meshes: Iterable[PolyMesh] | None = None) -> None:
     """Check an operator on every element of some meshes (by default of a few with concave faces and holes).
 
@@ -51,6 +74,7 @@ def check_operator(operator: Operator, meshes: Iterable[PolyMesh] | None = None)
                 _check_edit(operator, mesh, element, legal, where)
 
 
+@_promising
 def check_simulator(simulator: Simulator, n_steps: int = 30, seed: int = 0) -> None:
     """Check a simulator by playing `n_steps` random actions.
 
@@ -80,6 +104,7 @@ def check_simulator(simulator: Simulator, n_steps: int = 30, seed: int = 0) -> N
     )
 
 
+@_promising
 def check_target_source(source: TargetSource, n: int = 10) -> None:
     """Check a source of targets with the seeds 0 to `n` - 1.
 
@@ -100,6 +125,7 @@ def check_target_source(source: TargetSource, n: int = 10) -> None:
     _require(_raises(ConfigError, lambda: source.sample(-1)), "seed -1 is not refused with a ConfigError")
 
 
+@_promising
 def check_env(env: Any, n_steps: int = 60, seed: int = 0) -> None:
     """Check of an AutoPoly environment, wrapped or not, what Gymnasium's own `check_env` does not.
 

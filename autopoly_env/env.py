@@ -25,6 +25,7 @@ REWARD_MODES = ("score", "improvement")
 RENDER_MODES = ("rgb_array", "ansi")
 RESET_OPTIONS = ("target", "mesh", "state")
 _ANY_SHAPE = Silhouette(np.ones((8, 8), np.bool_))  # stands for the target while the rules are checked
+MOST_VERTICES = 10_000  # that arrays are padded to
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,18 +141,18 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
             "operators": operators,
             "resolution": whole("resolution", resolution),
             "weights": ScoreWeights(number("w_sm", w_sm), number("w_sc", w_sc), number("w_si", w_si)),
-            "max_steps": whole("max_steps", max_steps, at_least=1),
+            "max_steps": whole("max_steps", max_steps, 1, 2**31 - 1),
             "match_threshold": number("match_threshold", match_threshold),
         }
         example = self._simulator_of(_ANY_SHAPE)
-        self.codec = ActionCodec(example.operators, whole("max_vertices", max_vertices, at_least=4))
-        self._observer = Observer(max_vertices, whole("obs_resolution", obs_resolution, at_least=2), max_steps)
+        self.codec = ActionCodec(example.operators, whole("max_vertices", max_vertices, 4, MOST_VERTICES))
+        self._observer = Observer(max_vertices, whole("obs_resolution", obs_resolution, 2, 1024), max_steps)
         rules = {**example.settings(), "max_vertices": max_vertices}
         self._rules = tuple((name, value) for name, value in rules.items() if name != "target")
         self._improvement = one_of("reward_mode", reward_mode, REWARD_MODES) == "improvement"
         self._illegal_penalty = number("illegal_penalty", illegal_penalty)
         self.render_mode = one_of("render_mode", render_mode, (None, *RENDER_MODES))
-        self._render_size = whole("render_size", render_size, at_least=16)
+        self._render_size = whole("render_size", render_size, 16, 4096)
         self.action_space = gymnasium.spaces.Discrete(self.codec.n_actions)
         boxes: dict[str, gymnasium.Space[Any]] = {
             name: gymnasium.spaces.Box(field.low, field.high, field.shape, field.dtype)

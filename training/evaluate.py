@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -85,7 +86,7 @@ def evaluate(
     if merge:
         folder = out or FOLDER / "merged"
         merge_runs([Path(part) for part in suite], folder, fresh=fresh)
-        return _finish(folder, baseline, as_json)
+        return _finish(folder, baseline, as_json, set())
     found, only = _read(suite[0], override or [], budget, agents, baseline)
     part = TargetShard.parse(shard)
     folder = out or FOLDER / (found.name + (f"-{part.k}of{part.n}" if part.n > 1 else ""))
@@ -95,7 +96,7 @@ def evaluate(
     except KeyboardInterrupt:
         print(f"stopped by Ctrl-C; what was done is in {folder}: go on with --resume", file=sys.stderr)
         return TOLD
-    return _finish(folder, baseline, as_json)
+    return _finish(folder, baseline, as_json, only)
 
 
 def _check_flags(given: list[str], *, resume: bool, fresh: bool, merge: bool) -> None:
@@ -122,8 +123,8 @@ def _read(
     return suite, only
 
 
-def _finish(folder: Path, baseline: str | None, as_json: bool) -> int:
-    """Write and show the table of a run; 1 if some of its tasks failed."""
+def _finish(folder: Path, baseline: str | None, as_json: bool, only: set[str]) -> int:
+    """Write the table of a run and show it, of the labels in `only`, if it has any; 1 if some of its tasks failed."""
     from rich.console import Console
 
     from training.evaluation.folder import suite_of
@@ -136,6 +137,8 @@ def _finish(folder: Path, baseline: str | None, as_json: bool) -> int:
     suite.check_baseline(baseline)
     table = table_of(suite, records, info.targets, suite.missing(), baseline)
     write_tables(folder, table)
+    if only:
+        table = replace(table, rows=tuple(row for row in table.rows if row.label in only))
     if as_json:
         for row in records_of(table):
             print(json.dumps(row, allow_nan=False))

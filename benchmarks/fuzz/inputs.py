@@ -84,42 +84,43 @@ def array(rng: Rng) -> None:
 
 
 def option(rng: Rng) -> None:
-    """A value for an option of an agent, a simulator, an environment, a budget, a run, as text or as it is."""
+    """A value for an option of an agent, a budget, a run, a command, as text or as it is."""
     value = odd_value(rng)
     text = value if isinstance(value, str) else str(value)[:6000] if not isinstance(value, int) else hex(value)
-    match int(rng.integers(12)):
+    match int(rng.integers(10)):
         case 0:
             name = list(_AGENTS)[rng.integers(len(_AGENTS))]
             make_agent(name, **{str(rng.choice(_AGENTS[name])): value})
         case 1:
-            key = str(rng.choice(("w_sm", "w_sc", "w_si", "resolution", "max_steps", "match_threshold", "operators")))
-            AutoPolyEnv(**{key: value})
-        case 2:
-            key = str(rng.choice(("reward_mode", "split", "targets", "max_vertices", "obs_resolution", "render_size")))
-            AutoPolyEnv(**{key: value})
-        case 3:
             key = str(rng.choice(("refits", "seconds", "simulations")))
             build_config(Budget, {key: value}, "--budget")
-        case 4:
+        case 2:
             settings: dict[str, Any] = {}
             put_override(settings, f"{rng.choice(('a', 'a.b', '', 'a..b'))}={text}", "--set", "a=1")
-        case 5:
+        case 3:
             read_wishes(None, None, text, None)
-        case 6:
+        case 4:
             read_wishes(None, None, None, text)
-        case 7:
+        case 5:
             TargetShard.parse(f"{text}/{odd_value(rng)}"[:9000])
-        case 8:
+        case 6:
             preset(text)
-        case 9:
+        case 7:
             make_targets(text)
-        case 10:
+        case 8:
             key = str(
                 rng.choice(("run.seed", "run.minutes", "run.n_threads", "optim.lr", "env.max_steps", "env.courses"))
             )
             plain(read_config(None, [f"{key}={text}"], TrainRlConfig()))
         case _:
             whole("n", value), number("x", value), one_of("mode", value, ("a", "b")), _BOX.target(value)
+
+
+def environment(rng: Rng) -> None:
+    """An argument of the environment."""
+    known = ("w_sm", "w_sc", "w_si", "resolution", "max_steps", "match_threshold", "operators", "reward_mode", "split")
+    key = str(rng.choice((*known, "targets", "max_vertices", "obs_resolution", "render_size", "illegal_penalty")))
+    AutoPolyEnv(**{key: odd_value(rng)})
 
 
 def yaml(rng: Rng) -> None:
@@ -181,10 +182,11 @@ def simulator(rng: Rng) -> None:
 
 # What is tried, and how many of 500 inputs it has: the quick ones many, the slow ones few.
 DOORS: dict[str, tuple[Callable[[Rng], None], int]] = {
-    "sequence": (sequence, 190),
+    "sequence": (sequence, 140),
     "array": (array, 60),
-    "option": (option, 150),
-    "simulator": (simulator, 80),
-    "yaml": (yaml, 19),
+    "option": (option, 146),
+    "simulator": (simulator, 140),
+    "environment": (environment, 5),
+    "yaml": (yaml, 8),
     "command": (command, 1),
 }
