@@ -1,5 +1,6 @@
 """The command `python -m agents.export`: construction sequences as pages, drawings, meshes, pictures and scripts."""
 
+import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +13,7 @@ from agents.commands.running import FAILURE, complain, run_command
 from autopoly_env.errors import AutoPolyError, ConfigError, OutputError, SequenceError
 from autopoly_env.export.formats import LISTED, Export, Format, find_format, format_of, formats
 from autopoly_env.outside import described
+from autopoly_env.shown import tame
 
 if TYPE_CHECKING:
     from autopoly_env.sequence import ConstructionSequence
@@ -97,7 +99,7 @@ def export(
     for source, goal in jobs:
         try:
             _write(made, Export(_load(source, step), silhouette, depth), goal)
-            print(goal)
+            print(tame(str(goal)))
         except ConfigError:
             raise
         except AutoPolyError as error:
@@ -114,7 +116,7 @@ def main(arguments: list[str] | None = None) -> int:
 def _choose(to: str | None, out: Path | None, n: int) -> Format:
     """The format of `n` sequences: by its name, or by the ending of --out. Raises ConfigError if they contradict."""
     named = None if to is None else find_format(to)
-    if out is None or not out.suffix or out.is_dir():
+    if out is None or not out.suffix or os.path.isdir(out):
         return named or find_format(DEFAULT)
     if n > 1:  # to go into a folder, which may have a dot in its name
         if out.suffix.lower() in {suffix for other in formats().values() for suffix in other.suffixes}:
@@ -139,7 +141,7 @@ def _write(made: Format, export: Export, goal: Path) -> None:
     except Exception as error:  # whatever it is, the other sequences can be written
         what = described(error, module)
         raise OutputError(f"{who}, failed: {what}; expected a file or an OutputError ({_CHECK})") from error
-    if not goal.exists():
+    if not os.path.exists(goal):
         raise OutputError(f"{who}, made no such file ({_CHECK})")
 
 
@@ -160,8 +162,8 @@ def _name_outputs(sources: list[Path], out: Path | None, suffix: str) -> Iterato
     taken = {source.resolve() for source in sources}
     for source in sources:
         if out is None:
-            goal = source.with_suffix(suffix)
-        elif len(sources) == 1 and out.suffix and not out.is_dir():
+            goal = source.with_suffix(suffix) if source.name else source / f"sequence{suffix}"
+        elif len(sources) == 1 and out.suffix and not os.path.isdir(out):
             goal = out
         else:
             name = source.resolve().parent.name if source.stem == "sequence" else source.stem

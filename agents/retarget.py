@@ -75,7 +75,7 @@ def retarget(
         report.begin(job.name)
         try:
             with ctrl_c.searching():
-                done = work(simulator, sequence, budget, report.progress)
+                done = work(simulator, sequence, budget, ctrl_c.heeding(report.progress))
             told = replace(done.solution.sequence, settings={**done.solution.sequence.settings, **_notes_of(done)})
             solution = replace(done.solution, sequence=told)
             files = write_results(out / job.name, solution, silhouette, ctrl_c.shielded)

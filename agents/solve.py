@@ -1,14 +1,12 @@
 """The command `python -m agents.solve`: from silhouette images to meshes, construction sequences and pictures."""
 
-import errno
-import io
 import sys
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from agents.commands.running import FAILURE, complain, run_command
+from agents.commands.running import run_command
 from agents.names import AGENT_NAMES
 from autopoly_env.errors import AutoPolyError
 
@@ -153,13 +151,7 @@ def solve(
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; whatever is wrong is told in one line on stderr. Returns the exit code."""
-    try:
-        return run_command(app, arguments, "python -m agents.solve", stopped="")
-    except OSError as error:
-        if error.errno == errno.EPIPE:
-            raise
-        sys.stdout = io.StringIO()  # so that leaving does not fail on it again
-        return complain(f"cannot print the results ({error.strerror}); give them another place to go", FAILURE)
+    return run_command(app, arguments, "python -m agents.solve")
 
 
 def _parse_options(given: list[str]) -> dict[str, Any]:

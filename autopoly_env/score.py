@@ -1,15 +1,18 @@
 """The reward of the paper: 100 IoU - w_sc (V + E + F) - w_si self-intersections."""
 
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from itertools import combinations
 
 import numpy as np
 import shapely
 
+from autopoly_env.arguments import number
 from autopoly_env.arrays import FloatArray, IntArray
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh, geometry_kernels
 from autopoly_env.raster import pixels_of, raster_kernels, workspace
+from autopoly_env.shown import short
 from autopoly_env.silhouette import Target
 
 
@@ -24,8 +27,10 @@ class ScoreWeights:
 
     def __post_init__(self) -> None:
         for name, value in asdict(self).items():
-            if not (np.isfinite(value) and value >= 0.0):
-                raise ConfigError(f"{name} = {value}: expected a finite weight of at least 0")
+            with suppress(ConfigError):
+                if number(name, value) >= 0.0:
+                    continue
+            raise ConfigError(f"{name} = {short(value)}: expected a finite weight of at least 0")
 
 
 @dataclass(frozen=True)

@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 import shapely
 
+from autopoly_env.arguments import number, whole
 from autopoly_env.arrays import BoolArray
 from autopoly_env.compute import Job, Routine, map_threads, run
 from autopoly_env.details import Details, hairlines
 from autopoly_env.errors import ConfigError, IllegalActionError, MeshError
-from autopoly_env.guidance import Guidance, ImportanceSource, importance_settings, weighted
+from autopoly_env.guidance import MOST_CORNERS, Guidance, ImportanceSource, importance_settings, weighted
 from autopoly_env.mesh import FaceRule, PolyMesh, broken_faces, check_faces, defects_of, face_rule
 from autopoly_env.operators import STOP, Action, Choice, Halfway, Operator, Start, describe, legal_actions, preset
 from autopoly_env.placement import Disagreement, Trial, tried
@@ -84,11 +85,10 @@ class Simulator:
         symmetry: bool | float | None = None,
         keep: str | None = None,
     ) -> None:
+        resolution, max_steps = whole("resolution", resolution), whole("max_steps", max_steps)
         if not 8 <= resolution <= 1024:
             raise ConfigError(f"resolution {resolution}: expected 8 to 1024 pixels a side")
-        if max_steps < 0:
-            raise ConfigError(f"max_steps {max_steps}: expected at least 0")
-        if not 0.0 < match_threshold <= 1.0:
+        if not 0.0 < number("match_threshold", match_threshold) <= 1.0:
             raise ConfigError(f"match_threshold {match_threshold}: expected an IoU above 0, at most 1")
         self.faces = face_rule(faces)
         self.silhouette = silhouette if importance is None else weighted(silhouette, importance)
@@ -104,6 +104,7 @@ class Simulator:
         self._scored = self.silhouette.target(own) if self.silhouette.is_scored_by_area else self._target
         self.finest = min(own, POLISH_RESOLUTION)  # pixels a side at which meshes are finished
         self._refined_at = own * -(-SMALL // own) if self.silhouette.is_scored_by_area else self.finest  # whole blocks
+        self.n_refits = 0  # that its transitions and initial states have taken so far, whoever asked for them
         self._refit_targets: dict[tuple[int, float], RefitTarget] = {}
 
     def __getstate__(self) -> dict[str, Any]:
@@ -153,10 +154,14 @@ class Simulator:
         """`initial` as a routine, whose jobs are the refits."""
         mesh = self.guidance.start if mesh is None else mesh
         if mesh is not None:
+            n_corners = sum(map(len, mesh.faces))
+            if n_corners > MOST_CORNERS:
+                raise ConfigError(f"the start mesh has {n_corners} corners: expected at most {MOST_CORNERS}")
             self.guidance.check_symmetric(mesh)
             self._check_faces(mesh, "the mesh")
             return self._ended(State(mesh, self.score(mesh), n_refits=0))
         fits = yield [self._refit_job(box, FROM_AFAR, 1.0) for box in self._bounding_boxes()]
+        self.n_refits += len(fits)
         best = max((fit.mesh for fit in fits), key=lambda fit: self.score(fit).total)
         return self._ended(State(best, self.score(best), n_refits=len(fits)))
 
@@ -196,8 +201,8 @@ class Simulator:
         if self.faces == "any":
             return
         earlier = self.guidance.earlier
-        for number, mesh in enumerate([] if earlier is None else earlier.meshes()):
-            self._check_faces(mesh, f"mesh {number} of the sequence to go on from")
+        for k, mesh in enumerate([] if earlier is None else earlier.replayed()):
+            self._check_faces(mesh, f"mesh {k} of the sequence to go on from")
         if self.guidance.start is not None:
             self._check_faces(self.guidance.start, "the start mesh")
 
@@ -259,7 +264,11 @@ class Simulator:
         return self.final_score(mesh).total - self.off(mesh)
 
     def legal_actions(self, state: State) -> list[Action]:
-        """What may be done next; STOP first, and nothing once it is over."""
+        """What may be done next; STOP first, and nothing once it is over.
+
+        A few of these turn out to have no room once they are tried: `transition` refuses them, `transition_all` leaves
+        them out.
+        """
         if state.done:
             return []
         actions = [a for a in legal_actions(state.mesh, self.operators) if self.guidance.allows(state.mesh, a)]
@@ -269,7 +278,11 @@ class Simulator:
         return [STOP, *actions]
 
     def transition(self, state: State, action: Action) -> State:
-        """The state after one action and its refit. Raises IllegalActionError where the action is not legal."""
+        """The state after one action and its refit.
+
+        It has no crossing, and no flipped or empty face, that the state before has not. Raises IllegalActionError where
+        the action is not legal, and where even the refit leaves no room for it.
+        """
         return run(self.transition_routine(state, action))
 
     def transition_routine(self, state: State, action: Action) -> Routine[State]:
@@ -279,8 +292,14 @@ class Simulator:
         if action == STOP:
             return replace(state, done="stop", action=STOP, choice=None, n_refits=0, halfway=None)
         self._check_operator(action)
-        trial = self.trial_of(Disagreement(state.mesh, self.silhouette), action)
-        return (yield from self._refitted(state, trial))
+        disagreement = Disagreement(state.mesh, self.silhouette)
+        trial = self.trial_of(disagreement, action)
+        after = yield from self._refitted(state, trial)
+        self.n_refits += after.n_refits
+        if not _is_as_sane(after, disagreement):
+            what = describe(state.mesh, action)
+            raise IllegalActionError(f"{what} has no room: edges would cross, or a face be flipped or empty")
+        return after
 
     def idle(self, state: State) -> State:
         """The state one step later, nothing done: what a player that asks for an illegal action gets."""
@@ -289,8 +308,8 @@ class Simulator:
     def transition_all(self, state: State, actions: Sequence[Action] | None = None) -> list[State]:
         """`transition` of all (or the given) actions but STOP, on all cores, in their order.
 
-        Actions that turn out to have no room, such as a hole that fits nowhere, are left out. Raises
-        IllegalActionError for operators that are not the simulator's.
+        Actions that turn out to have no room, such as a hole that fits nowhere, are left out, though their refits
+        count. Raises IllegalActionError for operators that are not the simulator's.
         """
         if state.done:
             return []
@@ -300,7 +319,9 @@ class Simulator:
                 self._check_operator(action)
         disagreement = Disagreement(state.mesh, self.silhouette)
         trials = self._possible(disagreement, [action for action in chosen if action != STOP])
-        return map_threads(lambda trial: run(self._refitted(state, trial)), trials)
+        made = map_threads(lambda trial: run(self._refitted(state, trial)), trials)
+        self.n_refits += sum(after.n_refits for after in made)
+        return [after for after in made if _is_as_sane(after, disagreement)]
 
     def _check_operator(self, action: Action) -> None:
         if action.operator not in self.operators:
@@ -407,6 +428,11 @@ class Simulator:
             return refined
         tuned = tune(refined, self.silhouette.target(self.finest), self.guidance.bonds(mesh), self.faces)
         return max((refined, tuned), key=self.worth)
+
+
+def _is_as_sane(after: State, before: Disagreement) -> bool:
+    """Whether a transition has brought no crossing, and no flipped or empty face."""
+    return all(now <= then for now, then in zip(defects_of(after.mesh), before.defects, strict=True))
 
 
 def _ends_changed(before: PolyMesh, after: PolyMesh) -> set[int]:

@@ -52,10 +52,12 @@ class BeamAgent(Agent):
             for parent in kept:
                 if meter.spent():
                     break
+                n_before = simulator.n_refits
                 states = simulator.transition_all(parent.state)
+                n_refits = simulator.n_refits - n_before
                 children = [Track(state, parent) for state in states if simulator.is_sound(state.mesh)]
                 yield from children
-                meter.add(states)
+                meter.add(states, n_refits)
                 tracks += children
             waived = simulator.weights.w_sc * self._config.stuck_discount if failures else 0.0
             kept = self._select(simulator, tracks, waived)

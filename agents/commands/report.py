@@ -14,7 +14,9 @@ from agents.commands.columns import LESSON
 from agents.commands.losses import record_of_losses
 from agents.commands.progress import TASK, progress_bar
 from agents.commands.results import Result
+from agents.commands.screen import say
 from autopoly_env.sequence import Lesson
+from autopoly_env.shown import tame, told
 
 FORMATS = {  # of the numbers that a table can show, each and as a mean
     "r_sm": (".4f", ".4f"),
@@ -73,8 +75,8 @@ class Report:
 
     def begin(self, name: str) -> None:
         """An image is begun."""
-        self._name = name
-        self._bar.update(TASK, description=name)
+        self._name = tame(name)
+        self._bar.update(TASK, description=self._name)
 
     def progress(self, progress: budget.Progress) -> None:
         """An agent has come this far with it."""
@@ -99,7 +101,7 @@ class Report:
     def failed(self, what: str, problem: str) -> None:
         """Something, most often an image, has failed."""
         self.n_failed += 1
-        problem = " ".join(problem.split())
+        problem = told(problem)
         self._bar.advance(TASK)
         if self._as_json:
             _print_record({"image": what, "error": problem})
@@ -107,7 +109,7 @@ class Report:
 
     def say(self, text: str) -> None:
         """A line on stderr, above the progress bar."""
-        _print_line(self._messages, text)
+        say(self._messages, text)
 
     def finish(self, overview: Path | None) -> None:
         """The work is done: show the table and what else there is to know, last the picture to open."""
@@ -122,11 +124,7 @@ class Report:
         if not self._as_json:
             self._output.print(_table(self._rows, self._columns))
         for line in lines:
-            _print_line(self._messages if self._as_json else self._output, line)
-
-
-def _print_line(console: Console, text: str) -> None:
-    console.print(text, markup=False, highlight=False, emoji=False, soft_wrap=True)
+            say(self._messages if self._as_json else self._output, line)
 
 
 def _print_record(record: dict[str, Any]) -> None:
@@ -161,7 +159,7 @@ def _table(rows: dict[str, dict[str, float]], columns: tuple[str, ...]) -> Table
         mean = sum(numbers[name] for numbers in rows.values()) / len(rows)
         table.add_column(name, footer=format(mean, FORMATS[name][1]), justify="right", no_wrap=True)
     for image, numbers in rows.items():
-        table.add_row(Text(image), *(format(numbers[name], FORMATS[name][0]) for name in columns))
+        table.add_row(Text(tame(image)), *(format(numbers[name], FORMATS[name][0]) for name in columns))
     return table
 
 

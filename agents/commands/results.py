@@ -4,6 +4,7 @@ import math
 import os
 import shutil
 import tempfile
+import time
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -18,12 +19,16 @@ from autopoly_env.arrays import ByteArray
 from autopoly_env.details import Losses
 from autopoly_env.errors import OutputError
 from autopoly_env.export import contact_sheet, save_html, save_png, to_obj, to_svg
+from autopoly_env.shown import told
 from autopoly_env.silhouette import Silhouette
 
 RESULTS = ("sequence.json", "mesh.obj", "mesh.svg", "steps.png", "player.html")
 OVERVIEW = "overview.png"
+_STAGING = ".solve-"  # how folders begin in which results are completed; the number of the process follows
+_PATIENCE = 5.0  # seconds that a folder is left alone, lest one of another machine is taken
 PAGE_SIZE = 3850  # pixels that an overview may have each way
 CELL_SIZE = 256  # pixels of a mesh in it, if that fits
+_MOST_CAPTION = 60  # letters of a name in it
 
 
 @dataclass(frozen=True)
@@ -39,10 +44,14 @@ class Result:
 
 
 def claim_folder(folder: Path) -> None:
-    """Make the folder for the results, and see that it can be written. Raises OutputError."""
+    """Make the folder for the results, and see that it can be written; what a killed run has left in it goes.
+
+    Raises OutputError.
+    """
     try:
         folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
+        _sweep(folder)
     except OSError as error:
         reason = error.strerror or error
         raise OutputError(f"cannot write to the folder {folder} ({reason}); give another one with --out") from None
@@ -56,7 +65,10 @@ def write_results(
     The moves happen within `shielded()`. Raises OutputError if that does not work.
     """
     try:
-        staging = Path(tempfile.mkdtemp(prefix=".solve-", suffix=".tmp", dir=folder.parent))
+        in_the_way = next((folder / name for name in RESULTS if (folder / name).is_dir()), None)
+        if in_the_way is not None:
+            raise OutputError(f"cannot write {in_the_way} (a folder is in its place); move that away")
+        staging = Path(tempfile.mkdtemp(prefix=f"{_STAGING}{os.getpid()}-", suffix=".tmp", dir=folder.parent))
         try:
             solution.sequence.save(staging / "sequence.json")
             (staging / "mesh.obj").write_text(to_obj(solution.mesh), encoding="utf-8")
@@ -74,6 +86,26 @@ def write_results(
     return {name: folder / name for name in RESULTS}
 
 
+def _sweep(folder: Path) -> None:
+    """Remove the staging folders of runs on this machine that are not there any more."""
+    for left in folder.glob(f"{_STAGING}*.tmp"):
+        owner = left.name.removeprefix(_STAGING).partition("-")[0]
+        if not (owner.isdecimal() and _is_running(int(owner))) and time.time() - left.stat().st_mtime > _PATIENCE:
+            shutil.rmtree(left, ignore_errors=True)
+
+
+def _is_running(process: int) -> bool:
+    if os.name == "nt":  # where signal 0 is no question
+        return True
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except OSError:  # it is somebody else's
+        return True
+    return True
+
+
 class Overview:
     """All meshes over their targets on one page, in the order in which they were added."""
 
@@ -88,7 +120,7 @@ class Overview:
     def add(self, result: Result, silhouette: Silhouette) -> None:
         """Draw a mesh, its name and its r_all beneath."""
         solution = result.solution
-        caption = f"{result.name}\nr_all {solution.score.total:.2f}"
+        caption = f"{told(result.name, _MOST_CAPTION)}\nr_all {solution.score.total:.2f}"
         self._cells.append(viewer.draw_mesh(solution.mesh, silhouette, size=self._size, caption=caption))
 
     def page(self) -> Image.Image:

@@ -15,6 +15,7 @@ from agents.commands.ctrl_c import CtrlC
 from agents.commands.losses import in_words, losses_of
 from agents.commands.report import Report
 from agents.commands.results import OVERVIEW, RESULTS, Overview, Result, write_results
+from agents.commands.running import TOLD
 from agents.commands.wishes import NO_WISHES, Wishes
 from agents.contract import solved
 from agents.entry import AgentEntry
@@ -22,6 +23,7 @@ from agents.registry import find_agent
 from autopoly_env.compute import n_threads
 from autopoly_env.errors import AutoPolyError, ConfigError
 from autopoly_env.export import save_png
+from autopoly_env.files import file_stem
 from autopoly_env.mesh import face_rule
 from autopoly_env.outside import described
 from autopoly_env.score import ScoreWeights
@@ -115,7 +117,7 @@ def name_jobs(images: Sequence[Path], out: Path) -> list[Job]:
     taken = {OVERVIEW: OVERVIEW}
     jobs = []
     for image in images:
-        stem = image.stem.encode("utf-8", "replace").decode().lstrip(".") or "image"
+        stem = file_stem(image)
         name, count = stem, 1
         while name.casefold() in taken:
             count += 1
@@ -139,10 +141,10 @@ def solve_all(jobs: Sequence[Job], settings: Settings, out: Path, report: Report
             report.finish(_write_overview(overview, out, report))
         except KeyboardInterrupt:
             report.say("aborted by Ctrl-C; the files that were written are whole")
-            return 130
+            return TOLD
     if ctrl_c.n_pressed:
         report.say(f"stopped by Ctrl-C: {n_left} of {len(jobs)} images left")
-        return 130
+        return TOLD
     return 1 if report.n_failed else 0
 
 
@@ -190,7 +192,7 @@ def _solve(job: Job, settings: Settings, out: Path, report: Report, ctrl_c: Ctrl
     silhouette = load_silhouette(job.image, name=job.name)
     simulator, agent = settings.simulator(silhouette), settings.new_agent()
     with ctrl_c.searching():
-        solution = solved(agent, simulator, settings.budget, report.progress)
+        solution = solved(agent, simulator, settings.budget, ctrl_c.heeding(report.progress))
     losses = losses_of(solution, simulator)
     lost = in_words(losses, simulator)
     own = {**settings.as_dict(), **({"lost": lost} if lost else {})}

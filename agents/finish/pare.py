@@ -20,8 +20,9 @@ def pare(simulator: Simulator, states: Sequence[State]) -> tuple[list[State], in
     pared, n_refits, n_added = [state for state in states if state.action != STOP], 0, 0
     while len(pared) > 1 and pared[-1].step < simulator.max_steps and len(pared[-1].mesh.vertices) <= MANY_VERTICES:
         state = replace(pared[-1], done="")
+        n_before = simulator.n_refits
         children = simulator.transition_all(state, _most_promising(simulator, state))
-        n_refits += sum(child.n_refits for child in children)
+        n_refits += simulator.n_refits - n_before
         sane = (child for child in children if simulator.is_sound(child.mesh))
         best = max(sane, key=simulator.standing, default=state)
         if simulator.standing(best) <= simulator.standing(state):

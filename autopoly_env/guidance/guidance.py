@@ -10,14 +10,17 @@ from typing import Any
 
 import numpy as np
 
+from autopoly_env.arguments import number
 from autopoly_env.errors import ConfigError, IllegalActionError, MeshError
 from autopoly_env.guidance.symmetry import best_axis
 from autopoly_env.mesh import PolyMesh, canonical_hash, defects_of, images_of, validate
 from autopoly_env.operators import OPERATORS, Action, describe
 from autopoly_env.refit import Bonds
 from autopoly_env.sequence import ConstructionSequence
+from autopoly_env.shown import short
 from autopoly_env.silhouette import Silhouette
 
+MOST_CORNERS = 2000  # of a mesh to start from: a refit takes memory by their square
 _LEAST_ROOM = 1 / 64  # beside an axis, in the unit square
 KEPT = {"holes": ("holes",), "parts": ("parts",), "all": ("holes", "parts")}  # what may be asked to be kept
 
@@ -138,6 +141,9 @@ def _check_start(mesh: PolyMesh) -> None:
     if not isinstance(mesh, PolyMesh):
         kind = type(mesh).__name__
         raise ConfigError(f"the start is a {kind}; expected a PolyMesh or a ConstructionSequence")
+    n_corners = sum(map(len, mesh.faces))
+    if n_corners > MOST_CORNERS:
+        raise ConfigError(f"the start mesh has {n_corners} corners: expected at most {MOST_CORNERS}")
     try:
         validate(mesh)
     except MeshError as error:
@@ -156,6 +162,8 @@ def _check_start(mesh: PolyMesh) -> None:
 
 
 def _check_locked(mesh: PolyMesh | None, locked: Collection[int]) -> None:
+    if not isinstance(locked, Collection) or not all(isinstance(name, int | np.integer) for name in locked):
+        raise ConfigError(f"locked={short(locked)}: expected ids of vertices, such as (0, 3)")
     if not locked:
         return
     if mesh is None:
@@ -167,7 +175,7 @@ def _check_locked(mesh: PolyMesh | None, locked: Collection[int]) -> None:
 
 
 def _axis(silhouette: Silhouette, symmetry: bool | float) -> float:
-    axis = best_axis(silhouette) if symmetry is True else float(symmetry)
+    axis = best_axis(silhouette) if symmetry is True else number("symmetry", symmetry)
     if not _LEAST_ROOM <= axis <= 1.0 - _LEAST_ROOM:
         raise ConfigError(f"symmetry about x = {axis:g}: expected an axis well inside the unit square, such as 0.5")
     return axis

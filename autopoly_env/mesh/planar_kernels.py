@@ -106,7 +106,8 @@ def arc_area(ring: FloatArray, i: int, j: int) -> float:
 
 
 @kernel
-def _is_free_diagonal(ring: FloatArray, face: IntArray, edges: IntArray, i: int, j: int) -> bool:
+def is_free_diagonal(ring: FloatArray, face: IntArray, edges: IntArray, i: int, j: int) -> bool:
+    """Whether corners i and j of a face are joined by a line strictly inside it that is no edge (E,2) of the mesh."""
     n = len(ring)
     if i == j or (i + 1) % n == j or (j + 1) % n == i:
         return False
@@ -149,7 +150,7 @@ def splittable_corners(vertices: FloatArray, corners: IntArray, offsets: IntArra
                 if mask[start + i]:
                     break
                 j = (i + step) % n
-                if _is_free_diagonal(ring, face, edges, i, j):
+                if is_free_diagonal(ring, face, edges, i, j):
                     mask[start + i] = mask[start + j] = True
     return mask
 
@@ -160,7 +161,7 @@ def split_imbalance(vertices: FloatArray, face: IntArray, edges: IntArray, i: in
     ring = ring_of(vertices, face)
     imbalance = np.full(len(face), np.inf)
     for j in range(len(face)):
-        if _is_free_diagonal(ring, face, edges, i, j):
+        if is_free_diagonal(ring, face, edges, i, j):
             imbalance[j] = abs(arc_area(ring, i, j) - arc_area(ring, j, i))
     return imbalance
 

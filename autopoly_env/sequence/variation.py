@@ -13,8 +13,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import AutoPolyError, SequenceError
 from autopoly_env.mesh import PolyMesh
@@ -27,6 +25,7 @@ from autopoly_env.sequence.file import Score, Step
 from autopoly_env.sequence.follower import Follower, Place, Taken, mirror_image, moved_to
 from autopoly_env.silhouette import Silhouette
 
+_MOST_WEIGHT = 1e9  # that settings may tell; they are of any content
 RESOLUTION = 256  # of the picture of the last mesh
 
 Positions = Mapping[int, tuple[float, float]]  # by vertex id, in the unit square
@@ -149,8 +148,9 @@ def weights_of(settings: Mapping[str, Any]) -> ScoreWeights:
     """The weights under which a sequence was scored; the default for those that its settings do not tell."""
     default = ScoreWeights()
     told = {name: settings.get(name, value) for name, value in vars(default).items()}
-    is_plain = all(isinstance(v, int | float) and np.isfinite(v) and v >= 0.0 for v in told.values())
-    return ScoreWeights(**told) if is_plain else default
+    if all(type(value) in (int, float) and 0.0 <= value <= _MOST_WEIGHT for value in told.values()):
+        return ScoreWeights(**told)
+    return default
 
 
 def _chosen_anew(before: PolyMesh, after: PolyMesh, step: Step, k: int, choice: Mapping[str, Any] | None) -> PolyMesh:

@@ -16,6 +16,8 @@ class Tree:
 
     weights = ScoreWeights(w_sc=1.0)
 
+    n_refits = 0  # that are counted: its states say themselves what they took
+
     def __init__(self, totals: dict[str, float], children: dict[str, str], twins: str = "", rich: str = "") -> None:
         self.children = children
         self.twins = twins  # nodes that are one shape

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from autopoly_env.errors import ConfigError
+from autopoly_env.errors import ConfigError, OutputError
 from autopoly_env.files import write_atomically
 from training.evaluation.display import Display
 from training.evaluation.folder import begin, claim
@@ -85,7 +85,10 @@ def run_suite(
             for result in results:
                 record = result.value.record if result.value else result.task.failed(result.error or "no result")
                 if result.value and result.value.picture and not target_path(folder, record.target).exists():
-                    write_atomically(target_path(folder, record.target), result.value.picture)
+                    try:
+                        write_atomically(target_path(folder, record.target), result.value.picture)
+                    except OutputError as error:  # one name that the disk will not have is no reason to end the run
+                        record = result.task.failed(str(error))
                 writer.append(record)
                 display.done(result.task, record)
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import ClassVar, Literal
 
 from autopoly_env.errors import ConfigError, SilhouetteError
+from autopoly_env.files import file_stem
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import Silhouette, find_images, load_silhouette
 from autopoly_env.targets import ConstructionTargets, ObjectTargets, split_seed
@@ -91,8 +92,8 @@ class FolderSpec:
             paths = find_images([self.root])[: self.n]
         except SilhouetteError as error:
             raise ConfigError(str(error)) from None
-        stems = [path.stem.encode("utf-8", "replace").decode().lstrip(".").replace("\\", "_") for path in paths]
-        names = _unlike([stem or "image" for stem in stems])
+        stems = [file_stem(path).replace("\\", "_") for path in paths]
+        names = _unlike(stems)
         return [_ImageTarget(name, path.resolve()) for name, path in zip(names, paths, strict=True)]
 
 

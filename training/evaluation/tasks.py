@@ -153,4 +153,6 @@ def _warm_up(suite: Suite, entry: Entry) -> None:
         mask[6:26, 6:26] = True
         mask[12:20, 12:20] = False
         with suppress(Exception):
-            solved(suite.new_agent(entry, 0), suite.simulator(Silhouette(mask), entry), WARM_UP)
+            frame = solved(suite.new_agent(entry, 0), suite.simulator(Silhouette(mask), entry), WARM_UP)
+            if frame.stats.stopped_by == "interrupted":
+                raise KeyboardInterrupt  # the agent has caught it, but it was meant for the run
