@@ -2,12 +2,15 @@
 
 from autopoly_env.silhouette.image_files import find_images
 from autopoly_env.silhouette.loading import ROUNDING, ImageSource, read_picture
+from autopoly_env.silhouette.options import DEFAULT_OPTIONS, ObjectOptions
 from autopoly_env.silhouette.silhouette import WEIGHT_STEPS, Silhouette, Target, area_means, load_silhouette
 
 __all__ = [
+    "DEFAULT_OPTIONS",
     "ROUNDING",
     "WEIGHT_STEPS",
     "ImageSource",
+    "ObjectOptions",
     "Silhouette",
     "Target",
     "area_means",

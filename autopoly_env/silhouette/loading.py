@@ -11,7 +11,7 @@ from typing import IO
 import numpy as np
 from PIL import Image, UnidentifiedImageError
 
-from autopoly_env.arrays import AnyArray, Float32Array
+from autopoly_env.arrays import AnyArray, ByteArray, Float32Array
 from autopoly_env.errors import SilhouetteError
 
 ImageSource = str | os.PathLike[str] | IO[bytes] | Image.Image | AnyArray
@@ -21,7 +21,12 @@ MAX_PIXELS = 500_000_000  # larger pictures are refused
 STRIP_PIXELS = 2**20  # pixels converted at a time, so that a huge picture never exists twice
 ROUNDING = 1e-6  # a float image may leave 0..1 by this much
 LUMA = np.array([0.299, 0.587, 0.114], dtype=np.float32)  # ITU-R BT.601, as Pillow's mode "L"
+GREY_MODES = ("1", "L", "LA", "La", "LAB")
 DEEP_MODES = ("I", "F", "I;16", "I;16B", "I;16L", "I;16N")  # more than 8 bits a pixel
+STRAY_SHARE, STRAY_REACH = (
+    5e-4,
+    2.0,
+)  # so many levels may be dead or hot pixels, if the range is so many times that of the rest
 EXIF_ORIENTATION = 0x0112
 # EXIF orientation -> what rights the picture: (transpose, then reverse rows, then reverse columns)
 RIGHTING = {
@@ -34,6 +39,8 @@ RIGHTING = {
     8: (True, True, False),
 }
 
+Layers = dict[str, AnyArray]  # of some rows: "grey" and "opacity" (h, W) float32, "colour" (h, W, 3) uint8
+
 _pillow_lock = threading.Lock()
 
 
@@ -41,15 +48,23 @@ _pillow_lock = threading.Lock()
 class Picture:
     """What was read from a source, before anything decides which part of it is the object.
 
-    `grey` (H, W) float32 in 0..1, None for a boolean array. `opacity` (H, W) float32 in 0..1: the alpha
-    channel where there is one, and a boolean array itself. `label` names the source in errors.
+    `grey` (H, W) float32 in 0..1, None for a boolean array. `colour` (H, W, 3) uint8, sRGB, None where all is grey.
+    `opacity` (H, W) float32 in 0..1: the alpha channel where there is one, and a boolean array itself. `label` names
+    the source in errors.
     """
 
     grey: Float32Array | None
+    colour: ByteArray | None
     opacity: Float32Array | None
     name: str
     label: str
     notes: tuple[str, ...]
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether all of it has one colour."""
+        shown = self.grey if self.colour is None else self.colour
+        return shown is None or bool((shown == shown[0, 0]).all())
 
 
 def read_picture(source: ImageSource) -> Picture:
@@ -114,18 +129,18 @@ def _read_pillow(image: Image.Image, name: str, label: str) -> Picture:
         with _pillow_limit(MAX_PIXELS):
             animated = getattr(image, "is_animated", False)
             image.load()
-        levels, notes = _reduced(lambda top, end: _pillow_levels(image, top, end), width, height)
+        layers, notes = _reduced(lambda top, end: _pillow_layers(image, top, end), width, height)
         orientation = image.getexif().get(EXIF_ORIENTATION, 1)
     except Exception as error:  # as above
         raise _undecodable(label, error) from error
     if animated:
         notes.insert(0, "first frame of several")
     if image.mode in DEEP_MODES:
-        levels = _stretched(levels, label, notes)
+        layers["grey"] = _stretched(layers["grey"], label, notes)
     if orientation in RIGHTING:
-        levels = _righted(levels, *RIGHTING[orientation])
+        layers = {key: _righted(layer, *RIGHTING[orientation]) for key, layer in layers.items()}
         notes.append(f"turned upright (EXIF orientation {orientation})")
-    return Picture(levels[0], levels[1] if len(levels) == 2 else None, name, label, tuple(notes))
+    return _picture(layers, name, label, notes)
 
 
 def _read_array(array: AnyArray) -> Picture:
@@ -146,78 +161,105 @@ def _read_array(array: AnyArray) -> Picture:
             raise SilhouetteError(f"{label} holds NaN or infinity; expected finite values: replace them")
         if low < -ROUNDING or high > 1 + ROUNDING:
             raise SilhouetteError(f"{label} spans {low:g}..{high:g}; expected floats in 0..1: rescale it")
-    levels, notes = _reduced(lambda top, end: _array_levels(array[top:end]), width, height)
-    grey = None if is_mask else levels[0]
-    opacity = levels[0] if is_mask else levels[1] if len(levels) == 2 else None
-    return Picture(grey, opacity, "silhouette", label, tuple(notes))
+    layers, notes = _reduced(lambda top, end: _array_layers(array[top:end]), width, height)
+    if is_mask:
+        return Picture(None, None, layers["grey"], "silhouette", label, tuple(notes))
+    return _picture(layers, "silhouette", label, notes)
 
 
-def _array_levels(array: AnyArray) -> Float32Array:
-    """Grey (and alpha) of some rows of an array: (1 or 2, rows, W) float32 in 0..1."""
+def _picture(layers: Layers, name: str, label: str, notes: list[str]) -> Picture:
+    colour = layers.get("colour")
+    if colour is not None and not _is_coloured(colour):
+        colour = None
+    return Picture(layers["grey"], colour, layers.get("opacity"), name, label, tuple(notes))
+
+
+def _is_coloured(colour: ByteArray) -> bool:
+    """Whether red, green and blue differ anywhere."""
+    return any((colour[..., 0] != colour[..., channel]).any() for channel in (1, 2))
+
+
+def _array_layers(array: AnyArray) -> Layers:
+    """Some rows of an array, in 0..1."""
     levels = array.astype(np.float32) / np.float32(255 if array.dtype == np.uint8 else 1)
     if levels.ndim == 2:
-        return levels[None]
+        return {"grey": levels}
     n_colours = levels.shape[2] - (levels.shape[2] in (2, 4))
-    grey = levels[..., :3] @ LUMA if n_colours == 3 else levels[..., 0]
-    return np.stack([grey, *np.moveaxis(levels[..., n_colours:], 2, 0)])
+    layers: Layers = {"grey": levels[..., :3] @ LUMA if n_colours == 3 else levels[..., 0]}
+    if n_colours == 3:
+        layers["colour"] = np.clip(np.rint(255 * levels[..., :3]), 0, 255).astype(np.uint8)
+    if levels.shape[2] > n_colours:
+        layers["opacity"] = levels[..., n_colours]
+    return layers
 
 
-def _pillow_levels(image: Image.Image, top: int, end: int) -> Float32Array:
-    """Grey (and alpha) of rows top..end of a loaded image: (1 or 2, rows, W) float32, in 0..1 unless it is
-    deep."""
+def _pillow_layers(image: Image.Image, top: int, end: int) -> Layers:
+    """Rows top..end of a loaded image, in 0..1 unless it is deep."""
     strip = image.crop((0, top, image.width, end))
     if strip.mode in DEEP_MODES:
-        return np.asarray(strip, dtype=np.float32)[None]
+        return {"grey": np.asarray(strip, dtype=np.float32)}
+    layers: Layers = {}
     if strip.has_transparency_data:
         strip = strip.convert("RGBA")
-        bands = [strip.convert("L"), strip.getchannel("A")]
-    else:
-        bands = [strip.getchannel("L") if strip.mode == "LAB" else strip.convert("L")]
-    return np.stack([np.asarray(band, dtype=np.float32) for band in bands]) / np.float32(255)
+        layers["opacity"] = _levels(strip.getchannel("A"))
+    layers["grey"] = _levels(strip.getchannel("L") if strip.mode == "LAB" else strip.convert("L"))
+    if strip.mode not in GREY_MODES:
+        layers["colour"] = np.asarray(strip if strip.mode == "RGB" else strip.convert("RGB"))
+    return layers
 
 
-def _reduced(
-    levels_of_rows: Callable[[int, int], Float32Array], width: int, height: int
-) -> tuple[Float32Array, list[str]]:
-    """Read strip by strip and average blocks of factor x factor pixels: (C, H, W) with sides <= MAX_SIDE,
-    notes."""
+def _levels(band: Image.Image) -> Float32Array:
+    return np.asarray(band, dtype=np.float32) / np.float32(255)
+
+
+def _reduced(layers_of_rows: Callable[[int, int], Layers], width: int, height: int) -> tuple[Layers, list[str]]:
+    """Read strip by strip and average blocks of factor x factor pixels: layers with sides <= MAX_SIDE, notes."""
     factor = -(-max(width, height) // MAX_SIDE)
     rows = factor * max(1, STRIP_PIXELS // (width * factor))
-    strips = [_block_means(levels_of_rows(top, min(top + rows, height)), factor) for top in range(0, height, rows)]
-    levels = np.concatenate(strips, axis=1)
+    strips = []
+    for top in range(0, height, rows):
+        strip = layers_of_rows(top, min(top + rows, height))
+        strips.append({name: _block_means(layer, factor) for name, layer in strip.items()})
+    layers = {name: np.concatenate([strip[name] for strip in strips]) for name in strips[0]}
     if factor == 1:
-        return levels, []
-    size = f"{levels.shape[2]}x{levels.shape[1]}"
-    return levels, [f"reduced from {width}x{height} to {size} (blocks of {factor}x{factor} averaged)"]
+        return layers, []
+    size = f"{layers['grey'].shape[1]}x{layers['grey'].shape[0]}"
+    return layers, [f"reduced from {width}x{height} to {size} (blocks of {factor}x{factor} averaged)"]
 
 
-def _block_means(levels: Float32Array, factor: int) -> Float32Array:
-    """Means over factor x factor blocks of (C, H, W); the last row and column of blocks may be smaller."""
+def _block_means(layer: AnyArray, factor: int) -> AnyArray:
+    """Means over factor x factor blocks of (H, W, ...); the last row and column of blocks may be smaller."""
     if factor == 1:
-        return levels
-    for axis in (1, 2):
-        starts = np.arange(0, levels.shape[axis], factor)
-        counts = np.diff(starts, append=levels.shape[axis]).astype(np.float32)
-        levels = np.add.reduceat(levels, starts, axis=axis)
-        levels /= counts[:, None] if axis == 1 else counts
-    return levels
+        return layer
+    means = layer.astype(np.float32)
+    for axis in (0, 1):
+        starts = np.arange(0, means.shape[axis], factor)
+        counts = np.diff(starts, append=means.shape[axis]).astype(np.float32)
+        means = np.add.reduceat(means, starts, axis=axis)
+        means /= np.expand_dims(counts, tuple(i for i in range(means.ndim) if i != axis))
+    return np.rint(means).astype(np.uint8) if layer.dtype == np.uint8 else means
 
 
 def _stretched(levels: Float32Array, label: str, notes: list[str]) -> Float32Array:
-    """Levels of unknown range, scaled so that they span 0..1."""
+    """Levels of unknown range, scaled so that they span 0..1, but for the odd pixel that is far beyond all others."""
     low, high = float(levels.min()), float(levels.max())
     if not np.isfinite(high - low):
         raise SilhouetteError(f"{label} holds NaN or infinity; expected finite levels: replace them")
     if low == high or (low, high) == (0, 1):
         return levels
+    inner_low, inner_high = (float(value) for value in np.quantile(levels, (STRAY_SHARE, 1 - STRAY_SHARE)))
+    if inner_high > inner_low and high - low > STRAY_REACH * (inner_high - inner_low):
+        n_stray = int(((levels < inner_low) | (levels > inner_high)).sum())
+        notes.append(f"levels {inner_low:g}..{inner_high:g} scaled to 0..1, {n_stray} pixels lie beyond")
+        return np.clip((levels - np.float32(inner_low)) / np.float32(inner_high - inner_low), 0, 1)
     notes.append(f"levels {low:g}..{high:g} scaled to 0..1")
     return (levels - np.float32(low)) / np.float32(high - low)
 
 
-def _righted(levels: Float32Array, transpose: bool, reverse_rows: bool, reverse_columns: bool) -> Float32Array:
+def _righted(layer: AnyArray, transpose: bool, reverse_rows: bool, reverse_columns: bool) -> AnyArray:
     if transpose:
-        levels = levels.swapaxes(1, 2)
-    return levels[:, :: -1 if reverse_rows else 1, :: -1 if reverse_columns else 1]
+        layer = layer.swapaxes(0, 1)
+    return layer[:: -1 if reverse_rows else 1, :: -1 if reverse_columns else 1]
 
 
 @contextmanager
