@@ -14,6 +14,9 @@ FRAME_PURE = 0.9  # share of a line that has to be frame
 STUDIED = 100  # pixels a side, about: a field of light is fitted to so many
 FADING = 0.04  # a field that varies less along the border is even light
 EVEN_ENOUGH = 0.85  # share of the border that one colour explains: no field is tried
+FLAT, FLAT_SHARE = 0.01, 0.3  # nor where so much of it is of one colour to the letter, as in drawings
+FLAT_SUPPORT = 0.9  # of what is that flat: an object may hide the rest of the border
+CORNER_VOTE = 0.1  # what each corner adds to the share of its colour
 FIELD_GAIN = 0.08  # by which a field must explain more of it
 FIELD_ORDERS = (2, 3, 4, 4, 4)  # of the polynomials that are fitted one after the other
 MOST_POINTS = 4096  # of the border that are looked at
@@ -27,13 +30,20 @@ class Background:
     """The background of a picture (H, W) in C features.
 
     `colour` (C,) is its colour, with even light; where it fades, `field` (C, 5, 5) has the coefficients of x^i y^j, x
-    and y from -1 to 1, or None. `share` of the border inside the frame looks like that, within `noise`.
+    and y from -1 to 1, or None. `share` of the border looks like that, within `noise`; `is_flat` if it is one colour to the
+    letter, as in a drawing.
     """
 
     colour: Float32Array
     field: FloatArray | None
     share: float
     noise: float
+    is_flat: bool = False
+
+    @property
+    def support(self) -> float:
+        """How sure it is that this is the background, 0 to 1."""
+        return max(self.share, FLAT_SUPPORT) if self.is_flat else self.share
 
     def distances(self, features: Float32Array) -> Float32Array:
         """How far (H, W) every pixel is from the background."""
@@ -48,9 +58,12 @@ class Background:
 def find_background(features: Float32Array) -> Background:
     """The background (H, W, C), judged by the border: by what most of it looks like."""
     points = _thinned(border(features))
-    colour, share = dominant(points)
-    found = Background(colour, None, share, _noise(np.linalg.norm(points - colour, axis=1)))
-    if share >= EVEN_ENOUGH or min(features.shape[:2]) < 16:
+    colour, share = dominant(points, features[[0, 0, -1, -1], [0, -1, 0, -1]])
+    residuals = np.linalg.norm(points - colour, axis=1)
+    is_flat = float((residuals < FLAT).mean()) >= FLAT_SHARE
+    noise = _noise(residuals[residuals < FLAT] if is_flat else residuals)
+    found = Background(colour, None, share, noise, is_flat)
+    if share >= EVEN_ENOUGH or is_flat or min(features.shape[:2]) < 16:
         return found
     fading = _fading(features)
     return found if fading is None or fading.share < share + FIELD_GAIN else fading
@@ -64,7 +77,7 @@ def find_frame(features: Float32Array) -> Frame:
         return NO_FRAME
     depth = 2 * limit + 1
     page, share = dominant(_thinned(border(features[depth:-depth, depth:-depth])))
-    if share < 0.5:
+    if share < FRAME_PURE:
         return NO_FRAME
     sides = (features, features[::-1], features.swapaxes(0, 1), features.swapaxes(0, 1)[::-1])
     widths = [_frame_width(side[: limit + 2], page, limit) for side in sides]
@@ -96,16 +109,16 @@ def border(array: AnyArray) -> AnyArray:
     return np.concatenate([array[0], array[-1], array[1:-1, 0], array[1:-1, -1]])
 
 
-def dominant(points: Float32Array) -> tuple[Float32Array, float]:
+def dominant(points: Float32Array, corners: Float32Array | None = None) -> tuple[Float32Array, float]:
     """The colour (C,) around which most of the points (N, C) lie, and the share that lies within SAME of it.
 
-    Of two that as many points have, the lighter one.
+    The corners (4, C) have a vote beside that. Of two that as many points have, the lighter one.
     """
     cells = np.floor(points / SAME).astype(np.int64)
     _, inverse, counts = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
     inverse = inverse.reshape(-1)
     best: tuple[float, float] = (-1.0, 0.0)
-    colour = points[0]
+    colour, best_share = points[0], 0.0
     for cell in np.argsort(-counts, kind="stable")[:4]:
         centre = np.median(points[inverse == cell], axis=0)
         for _ in range(3):
@@ -113,10 +126,12 @@ def dominant(points: Float32Array) -> tuple[Float32Array, float]:
             if not near.any():
                 break
             centre = np.median(points[near], axis=0)
-        key = (round(float((np.linalg.norm(points - centre, axis=1) < SAME).mean()), 3), float(centre[0]))
+        share = float((np.linalg.norm(points - centre, axis=1) < SAME).mean())
+        n_corners = 0 if corners is None else int((np.linalg.norm(corners - centre, axis=1) < SAME).sum())
+        key = (round(share + CORNER_VOTE * n_corners, 3), float(centre[0]))
         if key > best:
-            best, colour = key, centre.astype(np.float32)
-    return colour, best[0]
+            best, best_share, colour = key, share, centre.astype(np.float32)
+    return colour, best_share
 
 
 def _fading(features: Float32Array) -> Background | None:

@@ -25,7 +25,7 @@ def opinion(view: View) -> Opinion | None:
     mask = beyond_cut(distances, cut.level)
     if not mask.any() or mask.all():
         return None
-    support = background.share * (1.0 if cut.is_sharp else BLURRED)
+    support = background.support * (1.0 if cut.is_sharp else BLURRED)
     name = hex_of(background.colour)
     if background.field is None:
         notes = [f"object is what differs in colour from the background, {name}, by more than {cut.level:.2f}"]

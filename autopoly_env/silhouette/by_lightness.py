@@ -11,6 +11,7 @@ from autopoly_env.silhouette.opinion import Opinion, View
 # picture with more than MAX_UNCLEAR of such pixels is called a photo. Measured: antialiased icons from 16 px
 # <= 8 %, outlines blurred by 1 % of the side <= 3 %, JPEG at quality 5 <= 1 %; three photos in four > 13 %.
 FAR, MAX_UNCLEAR = 0.25, 0.10
+CLEAR = 0.01  # a picture with no more unclear pixels has two levels
 
 
 def split(view: View, side: str = "auto", threshold: float | None = None) -> Opinion:
@@ -35,7 +36,8 @@ def split(view: View, side: str = "auto", threshold: float | None = None) -> Opi
         words = f"more than two clear levels ({unclear:.0%} of the pixels fit neither)"
         notes.append(f"warning: {words}: is it a photo?")
     support = max(majority, 1.0 - majority) * max(0.0, 1.0 - 2.0 * unclear)
-    return Opinion(light != background_is_light, tuple(notes), support)
+    is_clear = unclear <= CLEAR
+    return Opinion(light != background_is_light, tuple(notes), support, is_clear=is_clear)
 
 
 def otsu(counts: IntArray) -> int:
@@ -70,7 +72,7 @@ def unclear_share(levels: ByteArray, counts: IntArray, last_dark: int) -> float:
     light_mean = np.average(np.arange(last_dark + 1, 256), weights=light)
     distance = np.minimum(np.abs(np.arange(256) - dark_mean), np.abs(np.arange(256) - light_mean))
     is_unclear = distance > FAR * (light_mean - dark_mean)
-    if counts[is_unclear].sum() <= 0.01 * MAX_UNCLEAR * levels.size:
+    if counts[is_unclear].sum() <= 0.1 * CLEAR * levels.size:
         return 0.0
     unclear, is_light = is_unclear[levels], levels > last_dark
     across, down = is_light[:, 1:] != is_light[:, :-1], is_light[1:] != is_light[:-1]

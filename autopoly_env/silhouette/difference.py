@@ -8,13 +8,13 @@ from autopoly_env.arrays import BoolArray, Float32Array
 from autopoly_env.silhouette.background import Background
 
 LEAST = 0.012  # no smaller difference is told from none
-USUAL = 0.07  # from here on something is there, if nothing speaks against it
+USUAL, USUAL_FLAT = 0.07, 0.03  # from here on something is there, if nothing speaks against it; in drawings
 PALE = 0.35  # of the strongest difference: a paler object has a lower cut
 STUDIED = 256  # pixels a side, about: the cut is chosen on so many
 STEP = 1.35  # between cuts that are tried
 HIGHEST = 0.65  # of the strongest difference: no higher cut is tried
 SOFT = 0.35  # pixels (of 256 a side) that an outline may give way when the cut is lowered by a quarter
-SHARP = 0.15  # the same, of a picture so small that its pixels are larger than that
+SHARP = 0.3  # the same, of a picture so small that its pixels are larger than that
 PEELED = 2  # pixels of a soft edge that are taken off at most
 
 
@@ -42,7 +42,7 @@ def choose_cut(distances: Float32Array, background: Background) -> Cut | None:
     if not len(beyond):
         return None
     strongest = float(np.quantile(beyond, 0.9))
-    level = max(noise, min(USUAL, PALE * strongest))
+    level = max(noise, min(USUAL_FLAT if background.is_flat else USUAL, PALE * strongest))
     best: Cut | None = None
     while best is None or level <= HIGHEST * strongest:
         softness, limit = _softness(small, level)

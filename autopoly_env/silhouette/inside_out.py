@@ -10,6 +10,7 @@ from autopoly_env.silhouette.cleaning import parts
 from autopoly_env.silhouette.opinion import Opinion
 
 CORNER_SHARE = 0.03  # of the picture: a corner is no larger
+TILE_CORNERS = 0.015  # of the picture, all four together: they show the shape of a tile
 NOTCHES = (0.08, 0.5)  # share of the border that notches take
 PAPER, INK = 0.3, 0.7  # how much lighter than the object, and how light at least, paper is
 
@@ -17,8 +18,8 @@ PAPER, INK = 0.3, 0.7  # how much lighter than the object, and how light at leas
 def righted(found: Opinion, features: Float32Array) -> Opinion:
     """The opinion turned inside out where its object is only what a larger object leaves free along the border.
 
-    - Four alike corners and nothing else: an object that fills the picture, such as a disc. With more inside them they
-      are corners of a page, and no object.
+    - Four alike corners, and perhaps something inside: an object that fills the picture, such as a disc or a tile; but if
+      the corners are tiny, those of a page, and no object.
     - Light notches along the border, around a dark shape that is whole: ink on paper that reaches the border.
     """
     if not border(found.mask).any() or min(found.mask.shape) < 8:
@@ -31,6 +32,9 @@ def righted(found: Opinion, features: Float32Array) -> Opinion:
         is_corner = np.isin(labels, corners)
         if n_parts == len(corners):
             return _turned(found, "the object fills the picture, its corners are background")
+        if is_corner.mean() >= TILE_CORNERS:
+            turned = _turned(replace(found, mask=is_corner), "the object is a tile, whose corners are background")
+            return turned.saying("something is drawn on it, which that takes alone")
         return replace(
             found,
             mask=found.mask & ~is_corner,

@@ -140,6 +140,8 @@ def _chosen(view: View) -> Opinion | None:
     if colour is None or lightness is None:
         return colour or lightness
     apart = disagreement(colour.mask, lightness.mask)
+    if apart <= AGREED and not lightness.is_clear and colour.support >= TRUSTED:
+        return colour.saying(*colour.remarks)
     if apart <= AGREED:
         return Opinion(lightness.mask, (*lightness.notes, *colour.remarks), max(colour.support, lightness.support))
     if colour.support >= TRUSTED and colour.support >= lightness.support:

@@ -50,7 +50,8 @@ def view_of(grey: Float32Array, colour: ByteArray | None) -> View:
 class Opinion:
     """A mask (H, W) of the object, how it came about, and how well the picture supports it, 0 to 1.
 
-    `remarks` are what is said beside `notes` only where another opinion is worth a word; `colour` is the background's.
+    `remarks` are what is said beside `notes` only where another opinion is worth a word; `colour` is the background's;
+    `is_clear` says that a picture has two levels of grey.
     """
 
     mask: BoolArray
@@ -58,6 +59,7 @@ class Opinion:
     support: float
     remarks: tuple[str, ...] = ()
     colour: str = ""
+    is_clear: bool = False
 
     def saying(self, *words: str) -> "Opinion":
         """The same with more notes."""
