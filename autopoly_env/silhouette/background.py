@@ -168,7 +168,7 @@ def _fading(features: Float32Array) -> Background | None:
 def _noise(residuals: AnyArray) -> float:
     """How far pixels of the background stray from it, but for the odd one."""
     inliers = residuals[residuals < SAME]
-    return float(np.quantile(inliers, 0.98)) if len(inliers) else SAME
+    return float(np.quantile(inliers, 0.96)) if len(inliers) else SAME
 
 
 def _basis(shape: tuple[int, ...]) -> FloatArray:

@@ -35,7 +35,7 @@ def opinion(view: View) -> Opinion | None:
         remarks = ["warning: the light is uneven: is it a photo?"]
     if not cut.is_sharp:
         remarks.append("the outline is soft: --threshold says where it is cut")
-    return Opinion(mask, tuple(notes), support, tuple(remarks), name)
+    return Opinion(mask, tuple(notes), support, tuple(remarks), name, background.is_flat)
 
 
 def asked(label: str, view: View, options: ObjectOptions) -> Opinion:

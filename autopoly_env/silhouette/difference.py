@@ -8,7 +8,8 @@ from autopoly_env.arrays import BoolArray, Float32Array
 from autopoly_env.silhouette.background import Background
 
 LEAST = 0.012  # no smaller difference is told from none
-USUAL, USUAL_FLAT = 0.07, 0.03  # from here on something is there, if nothing speaks against it; in drawings
+USUAL = 0.07  # from here on something is there, if nothing speaks against it
+EXACT = 0.004  # a flat background with no more noise is a drawing's: whatever differs from it at all is there
 PALE = 0.35  # of the strongest difference: a paler object has a lower cut
 STUDIED = 256  # pixels a side, about: the cut is chosen on so many
 STEP = 1.35  # between cuts that are tried
@@ -42,7 +43,9 @@ def choose_cut(distances: Float32Array, background: Background) -> Cut | None:
     if not len(beyond):
         return None
     strongest = float(np.quantile(beyond, 0.9))
-    level = max(noise, min(USUAL_FLAT if background.is_flat else USUAL, PALE * strongest))
+    level = max(noise, min(USUAL, PALE * strongest))
+    if background.is_flat and background.noise <= EXACT:
+        level = noise
     best: Cut | None = None
     while best is None or level <= HIGHEST * strongest:
         softness, limit = _softness(small, level)

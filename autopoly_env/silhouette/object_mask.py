@@ -140,11 +140,11 @@ def _chosen(view: View) -> Opinion | None:
     if colour is None or lightness is None:
         return colour or lightness
     apart = disagreement(colour.mask, lightness.mask)
-    if apart <= AGREED and not lightness.is_clear and colour.support >= TRUSTED:
+    if apart <= AGREED and not lightness.is_clear and (colour.is_clear or colour.support >= TRUSTED):
         return colour.saying(*colour.remarks)
     if apart <= AGREED:
         return Opinion(lightness.mask, (*lightness.notes, *colour.remarks), max(colour.support, lightness.support))
-    if colour.support >= TRUSTED and colour.support >= lightness.support:
+    if colour.is_clear or colour.support >= max(TRUSTED, lightness.support):
         other = "light" if "lighter" in lightness.notes[1] else "dark"
         share = f"{_share(lightness.mask, colour.mask)} of this: --object {other}"
         return colour.saying(*colour.remarks, f"lightness alone would find another object, {share}")

@@ -51,7 +51,7 @@ class Opinion:
     """A mask (H, W) of the object, how it came about, and how well the picture supports it, 0 to 1.
 
     `remarks` are what is said beside `notes` only where another opinion is worth a word; `colour` is the background's;
-    `is_clear` says that a picture has two levels of grey.
+    `is_clear` says that the background is flat, or that a picture has but two levels of grey.
     """
 
     mask: BoolArray
