@@ -12,11 +12,12 @@ FRAME_SHARE = 0.04  # of the shorter side: a frame is no wider
 FRAME_DIFFERS = 0.15  # from the page
 FRAME_PURE = 0.9  # share of a line that has to be frame
 STUDIED = 100  # pixels a side, about: a field of light is fitted to so many
-FADING = 0.04  # a field that varies less along the border is even light
+FADING = 0.12  # a field that varies less along the border is even light
 EVEN_ENOUGH = 0.85  # share of the border that one colour explains: no field is tried
 FLAT, FLAT_SHARE = 0.01, 0.3  # nor where so much of it is of one colour to the letter, as in drawings
 FLAT_SUPPORT = 0.9  # of what is that flat: an object may hide the rest of the border
-CORNER_VOTE = 0.1  # what each corner adds to the share of its colour
+CANDIDATES = 5  # colours of the border that may be the background's
+CORNER_VOTE = 0.15  # what each corner adds to the share of its colour
 FIELD_GAIN = 0.08  # by which a field must explain more of it
 FIELD_ORDERS = (2, 3, 4, 4, 4)  # of the polynomials that are fitted one after the other
 MOST_POINTS = 4096  # of the border that are looked at
@@ -112,26 +113,40 @@ def border(array: AnyArray) -> AnyArray:
 def dominant(points: Float32Array, corners: Float32Array | None = None) -> tuple[Float32Array, float]:
     """The colour (C,) around which most of the points (N, C) lie, and the share that lies within SAME of it.
 
-    The corners (4, C) have a vote beside that. Of two that as many points have, the lighter one.
+    What lies within FLAT counts twice, and the corners (4, C) have a vote beside that. Of two that as many points have,
+    the lighter one.
     """
-    cells = np.floor(points / SAME).astype(np.int64)
-    _, inverse, counts = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
+    cells = np.floor(points / FLAT).astype(np.int64)
+    _, first, inverse, counts = np.unique(cells, axis=0, return_index=True, return_inverse=True, return_counts=True)
     inverse = inverse.reshape(-1)
     best: tuple[float, float] = (-1.0, 0.0)
     colour, best_share = points[0], 0.0
-    for cell in np.argsort(-counts, kind="stable")[:4]:
-        centre = np.median(points[inverse == cell], axis=0)
-        for _ in range(3):
-            near = np.linalg.norm(points - centre, axis=1) < SAME
-            if not near.any():
-                break
-            centre = np.median(points[near], axis=0)
-        share = float((np.linalg.norm(points - centre, axis=1) < SAME).mean())
+    tried: list[int] = []
+    for cell in np.argsort(-counts, kind="stable"):
+        if any(np.linalg.norm(points[first[cell]] - points[first[other]]) < 0.5 * SAME for other in tried):
+            continue
+        tried.append(cell)
+        centre = _settled(points, np.median(points[inverse == cell], axis=0))
+        away = np.linalg.norm(points - centre, axis=1)
+        share, flat = float((away < SAME).mean()), float((away < FLAT).mean())
         n_corners = 0 if corners is None else int((np.linalg.norm(corners - centre, axis=1) < SAME).sum())
-        key = (round(share + CORNER_VOTE * n_corners, 3), float(centre[0]))
+        key = (round(share + flat + CORNER_VOTE * n_corners, 3), float(centre[0]))
         if key > best:
             best, best_share, colour = key, share, centre.astype(np.float32)
+        if len(tried) == CANDIDATES:
+            break
     return colour, best_share
+
+
+def _settled(points: Float32Array, centre: AnyArray) -> AnyArray:
+    """The middle of the points around a centre; the centre itself where most of those are its colour to the letter."""
+    for _ in range(3):
+        away = np.linalg.norm(points - centre, axis=1)
+        near = away < SAME
+        if (away < FLAT).sum() >= 0.5 * near.sum():
+            break
+        centre = np.median(points[near], axis=0)
+    return centre
 
 
 def _fading(features: Float32Array) -> Background | None:

@@ -15,7 +15,7 @@ STUDIED = 256  # pixels a side, about: the cut is chosen on so many
 STEP = 1.35  # between cuts that are tried
 HIGHEST = 0.65  # of the strongest difference: no higher cut is tried
 SOFT = 0.35  # pixels (of 256 a side) that an outline may give way when the cut is lowered by a quarter
-SHARP = 0.3  # the same, of a picture so small that its pixels are larger than that
+SHARP = 0.45  # the same in pixels of its own, of a picture so small that these are larger
 PEELED = 2  # pixels of a soft edge that are taken off at most
 
 

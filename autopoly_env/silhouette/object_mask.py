@@ -144,7 +144,7 @@ def _chosen(view: View) -> Opinion | None:
         return colour.saying(*colour.remarks)
     if apart <= AGREED:
         return Opinion(lightness.mask, (*lightness.notes, *colour.remarks), max(colour.support, lightness.support))
-    if colour.is_clear or colour.support >= max(TRUSTED, lightness.support):
+    if colour.is_clear or colour.support >= (lightness.support if lightness.is_clear else TRUSTED):
         other = "light" if "lighter" in lightness.notes[1] else "dark"
         share = f"{_share(lightness.mask, colour.mask)} of this: --object {other}"
         return colour.saying(*colour.remarks, f"lightness alone would find another object, {share}")
