@@ -10,6 +10,7 @@ from autopoly_env.silhouette.background import Background
 LEAST = 0.012  # no smaller difference is told from none
 USUAL = 0.07  # from here on something is there, if nothing speaks against it
 EXACT = 0.004  # a flat background with no more noise is a drawing's: whatever differs from it at all is there
+DUST = 3  # more parts at the lowest cut than at the usual one: it is no drawing, but a JPEG of one
 PALE = 0.35  # of the strongest difference: a paler object has a lower cut
 STUDIED = 256  # pixels a side, about: the cut is chosen on so many
 STEP = 1.35  # between cuts that are tried
@@ -44,7 +45,7 @@ def choose_cut(distances: Float32Array, background: Background) -> Cut | None:
         return None
     strongest = float(np.quantile(beyond, 0.9))
     level = max(noise, min(USUAL, PALE * strongest))
-    if background.is_flat and background.noise <= EXACT:
+    if background.is_flat and background.noise <= EXACT and not _is_dusty(small, noise, level):
         level = noise
     best: Cut | None = None
     while best is None or level <= HIGHEST * strongest:
@@ -56,6 +57,14 @@ def choose_cut(distances: Float32Array, background: Background) -> Cut | None:
             best = cut
         level *= STEP
     return best
+
+
+def _is_dusty(distances: Float32Array, noise: float, level: float) -> bool:
+    """Whether parts of their own lie between the noise and the usual cut: what lossy compression leaves around edges."""
+    from skimage.measure import label
+
+    faint, usual = (label(distances > cut, connectivity=2, return_num=True)[1] for cut in (noise, level))
+    return int(faint) - int(usual) > DUST
 
 
 def beyond_cut(distances: Float32Array, level: float) -> BoolArray:
