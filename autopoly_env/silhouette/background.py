@@ -31,8 +31,8 @@ class Background:
     """The background of a picture (H, W) in C features.
 
     `colour` (C,) is its colour, with even light; where it fades, `field` (C, 5, 5) has the coefficients of x^i y^j, x
-    and y from -1 to 1, or None. `share` of the border looks like that, within `noise`; `is_flat` if it is one colour to the
-    letter, as in a drawing.
+    and y from -1 to 1, or None. `share` of the border looks like that, within `noise`; `is_flat` if it is one
+    colour to the letter, as in a drawing.
     """
 
     colour: Float32Array

@@ -60,7 +60,7 @@ def choose_cut(distances: Float32Array, background: Background) -> Cut | None:
 
 
 def _is_dusty(distances: Float32Array, noise: float, level: float) -> bool:
-    """Whether parts of their own lie between the noise and the usual cut: what lossy compression leaves around edges."""
+    """Whether parts of their own lie between the noise and the usual cut: what lossy compression leaves at edges."""
     from skimage.measure import label
 
     faint, usual = (label(distances > cut, connectivity=2, return_num=True)[1] for cut in (noise, level))

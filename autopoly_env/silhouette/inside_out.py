@@ -18,8 +18,8 @@ PAPER, INK = 0.3, 0.7  # how much lighter than the object, and how light at leas
 def righted(found: Opinion, features: Float32Array) -> Opinion:
     """The opinion turned inside out where its object is only what a larger object leaves free along the border.
 
-    - Four alike corners, and perhaps something inside: an object that fills the picture, such as a disc or a tile; but if
-      the corners are tiny, those of a page, and no object.
+    - Four alike corners, and perhaps something inside: an object that fills the picture, such as a disc or a tile; but
+      if the corners are tiny, those of a page, and no object.
     - Light notches along the border, around a dark shape that is whole: ink on paper that reaches the border.
     """
     if not border(found.mask).any() or min(found.mask.shape) < 8:

@@ -10,7 +10,7 @@ from autopoly_env.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from autopoly_env.errors import ConfigError, SilhouetteError
 from autopoly_env.silhouette import cleaning, object_mask
 from autopoly_env.silhouette.image_files import find_images
-from autopoly_env.silhouette.loading import ImageSource, read_picture
+from autopoly_env.silhouette.loading import ImageSource, Picture, read_frames
 from autopoly_env.silhouette.options import DEFAULT_OPTIONS, ObjectOptions
 
 __all__ = ["ImageSource", "Silhouette", "Target", "find_images", "load_silhouette"]
@@ -148,13 +148,25 @@ def load_silhouette(
     >>> load_silhouette(np.eye(3, dtype=bool), name="diagonal")
     Silhouette(name='diagonal', notes=('object touches the border of the image',))
     """
-    picture = read_picture(source)
-    mask, how_found = object_mask.find_object(picture, options)
+    picture, mask, how_found = _first_object(source, options)
     mask, how_cleaned = cleaning.clean(mask, options)
     shape = mask.shape
     mask, how_padded = cleaning.square(mask)
     notes = (*picture.notes, *how_found, *how_cleaned, *how_padded)
     return Silhouette(mask, picture.name if name is None else name, notes, (shape[0], shape[1]))
+
+
+def _first_object(source: ImageSource, options: ObjectOptions) -> tuple[Picture, BoolArray, list[str]]:
+    """The first frame in which there is an object, its mask and the notes on it."""
+    problems: list[SilhouetteError] = []
+    for picture in read_frames(source):
+        try:
+            return picture, *object_mask.find_object(picture, options)
+        except SilhouetteError as problem:
+            problems.append(problem)
+    if len(problems) == 1:
+        raise problems[0]
+    raise SilhouetteError(f"{problems[0]} (so it is in all of its {len(problems)} frames)")
 
 
 def _area_average(mask: BoolArray, resolution: int) -> FloatArray:

@@ -221,12 +221,9 @@ def disc(size: int) -> np.ndarray:
     return rows**2 + columns**2 < (0.35 * size) ** 2
 
 
-def test_load__warns_of_a_picture_with_more_than_two_levels() -> None:
+def test_load__warns_of_a_picture_whose_levels_run_into_each_other() -> None:
     ramp = np.tile(np.linspace(0, 1, 64), (64, 1))
-    three_levels = np.where(disc(64), 0.0, 1.0)
-    three_levels[:20] = 0.5
-    for picture in (ramp, three_levels):
-        assert any(note.startswith("warning:") for note in load_silhouette(picture).notes)
+    assert any(note.startswith("warning:") for note in load_silhouette(ramp).notes)
 
 
 def test_load__does_not_take_antialiased_icons_and_blurred_jpegs_for_photos() -> None:
