@@ -11,6 +11,7 @@ import numpy as np
 
 from agents.base import Agent, check_guidance
 from agents.budget import Budget
+from agents.commands import pictures
 from agents.commands.ctrl_c import CtrlC
 from agents.commands.report import Report
 from agents.commands.results import OVERVIEW, RESULTS, Overview, Result, write_results
@@ -23,7 +24,7 @@ from autopoly_env.errors import AutoPolyError, ConfigError
 from autopoly_env.export import save_png
 from autopoly_env.outside import described
 from autopoly_env.score import ScoreWeights
-from autopoly_env.silhouette import Silhouette, load_silhouette
+from autopoly_env.silhouette import DEFAULT_OPTIONS, ObjectOptions, Silhouette, load_silhouette
 from autopoly_env.simulator import Simulator
 
 
@@ -40,6 +41,8 @@ class Settings:
     weights: ScoreWeights
     budget: Budget
     wishes: Wishes = NO_WISHES
+    picture: ObjectOptions = DEFAULT_OPTIONS
+    show_mask: bool = False
 
     def check(self) -> None:
         """Raise ConfigError for whatever is wrong, before any image is read."""
@@ -73,8 +76,13 @@ class Settings:
     def as_dict(self) -> dict[str, Any]:
         """What a construction sequence keeps beside the simulator's settings."""
         budget = asdict(self.budget)
-        settings = {"agent": self._entry.name, "options": self._options, "seed": self._seed, "budget": budget}
-        return {**settings, "guided_by": self.wishes.files} if self.wishes.files else settings
+        settings: dict[str, Any] = {"agent": self._entry.name, "options": self._options, "seed": self._seed}
+        settings["budget"] = budget
+        if self.wishes.files:
+            settings["guided_by"] = self.wishes.files
+        if self.picture != DEFAULT_OPTIONS:
+            settings["picture"] = pictures.as_dict(self.picture)
+        return settings
 
     @cached_property
     def _entry(self) -> AgentEntry:
@@ -118,7 +126,8 @@ def name_jobs(images: Sequence[Path], out: Path) -> list[Job]:
         notes = () if count == 1 else (f"warning: called {name} here, for {taken[stem.casefold()]} has its name, too",)
         taken[name.casefold()] = str(image)
         jobs.append(Job(image, name, notes))
-    results = {(out / path).resolve() for job in jobs for path in (*(f"{job.name}/{f}" for f in RESULTS), OVERVIEW)}
+    names = (*RESULTS, pictures.MASK)
+    results = {(out / path).resolve() for job in jobs for path in (*(f"{job.name}/{f}" for f in names), OVERVIEW)}
     for image in images:
         if image.resolve() in results:
             raise ConfigError(f"the results would overwrite the image {image}; give another folder with --out")
@@ -182,14 +191,14 @@ def _load_kernels(settings: Settings, ctrl_c: CtrlC) -> None:
 
 def _solve(job: Job, settings: Settings, out: Path, report: Report, ctrl_c: CtrlC) -> tuple[Result, Silhouette]:
     """Solve an image and write its results."""
-    silhouette = load_silhouette(job.image, name=job.name)
+    silhouette = load_silhouette(job.image, name=job.name, options=settings.picture)
     simulator, agent = settings.simulator(silhouette), settings.new_agent()
     with ctrl_c.searching():
         solution = solved(agent, simulator, settings.budget, report.progress)
     sequence = solution.sequence
     sequence = replace(sequence, settings={**sequence.settings, **settings.as_dict()})
     solution = replace(solution, sequence=sequence)
-    files = write_results(out / job.name, solution, silhouette, ctrl_c.shielded)
+    files = write_results(out / job.name, solution, silhouette, ctrl_c.shielded, with_mask=settings.show_mask)
     return Result(job.image, job.name, solution, (*job.notes, *silhouette.notes), files), silhouette
 
 
