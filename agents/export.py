@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from agents.commands import pictures
 from agents.commands.operators import OutsideOperators, know
 from agents.commands.running import FAILURE, complain, run_command
 from autopoly_env.errors import AutoPolyError, ConfigError, OutputError, SequenceError
@@ -78,6 +79,13 @@ def export(
         float, typer.Option(help="Thickness of the mesh, in units of the unit square, in formats that show it.")
     ] = 0.0,
     operators: OutsideOperators = None,
+    object_: pictures.Object = "auto",
+    background: pictures.Background = None,
+    threshold: pictures.Threshold = None,
+    alpha_threshold: pictures.AlphaThreshold = None,
+    min_speck: pictures.MinSpeck = None,
+    keep_specks: pictures.KeepSpecks = False,
+    show_mask: pictures.ShowMask = False,
 ) -> int:
     """Check the options, then write one sequence after the other; return the exit code."""
     from autopoly_env.silhouette import load_silhouette
@@ -86,6 +94,9 @@ def export(
     if out is not None and out.resolve() in {source.resolve() for source in sources}:
         raise ConfigError(f"{out}: is a sequence; give another --out")
     know(operators)
+    picture = pictures.read_options(object_, background, threshold, alpha_threshold, min_speck, keep_specks)
+    if target is None and (show_mask or pictures.as_dict(picture)):
+        raise ConfigError("--object, --show-mask and the like are about the picture of --target; give one")
     made = _choose(to, out, len(sources))
     if depth and not made.shows_depth:
         able = [name for name, other in formats().items() if other.shows_depth]
@@ -94,7 +105,9 @@ def export(
         able = [name for name, other in formats().items() if other.shows_target]
         raise ConfigError(f"--target {target}: {made.name} shows no target; use it with {', '.join(able)}")
     jobs = list(_name_outputs(sources, out, made.suffix))
-    silhouette = load_silhouette(target) if target else None
+    silhouette = load_silhouette(target, options=picture) if target else None
+    if silhouette is not None and show_mask:
+        print(pictures.save_mask(silhouette, jobs[0][1].with_name(f"{silhouette.name}-{pictures.MASK}")))
     n_failed = 0
     for source, goal in jobs:
         try:

@@ -11,6 +11,7 @@ import numpy as np
 
 from agents.base import Agent, check_faces, check_guidance
 from agents.budget import Budget
+from agents.commands import pictures
 from agents.commands.ctrl_c import CtrlC
 from agents.commands.losses import in_words, losses_of
 from agents.commands.report import Report
@@ -27,7 +28,7 @@ from autopoly_env.files import file_stem
 from autopoly_env.mesh import face_rule
 from autopoly_env.outside import described
 from autopoly_env.score import ScoreWeights
-from autopoly_env.silhouette import SMALL, Silhouette, load_silhouette
+from autopoly_env.silhouette import DEFAULT_OPTIONS, SMALL, ObjectOptions, Silhouette, load_silhouette
 from autopoly_env.simulator import Simulator
 
 
@@ -45,6 +46,8 @@ class Settings:
     budget: Budget
     wishes: Wishes = NO_WISHES
     faces: str = "any"  # the rule of faces
+    picture: ObjectOptions = DEFAULT_OPTIONS
+    show_mask: bool = False
 
     def check(self) -> None:
         """Raise ConfigError for whatever is wrong, before any image is read."""
@@ -80,8 +83,13 @@ class Settings:
     def as_dict(self) -> dict[str, Any]:
         """What a construction sequence keeps beside the simulator's settings."""
         budget = asdict(self.budget)
-        settings = {"agent": self._entry.name, "options": self._options, "seed": self._seed, "budget": budget}
-        return {**settings, "guided_by": self.wishes.files} if self.wishes.files else settings
+        settings: dict[str, Any] = {"agent": self._entry.name, "options": self._options, "seed": self._seed}
+        settings["budget"] = budget
+        if self.wishes.files:
+            settings["guided_by"] = self.wishes.files
+        if self.picture != DEFAULT_OPTIONS:
+            settings["picture"] = pictures.as_dict(self.picture)
+        return settings
 
     @cached_property
     def _entry(self) -> AgentEntry:
@@ -125,7 +133,8 @@ def name_jobs(images: Sequence[Path], out: Path) -> list[Job]:
         notes = () if count == 1 else (f"warning: called {name} here, for {taken[stem.casefold()]} has its name, too",)
         taken[name.casefold()] = str(image)
         jobs.append(Job(image, name, notes))
-    results = {(out / path).resolve() for job in jobs for path in (*(f"{job.name}/{f}" for f in RESULTS), OVERVIEW)}
+    names = (*RESULTS, pictures.MASK)
+    results = {(out / path).resolve() for job in jobs for path in (*(f"{job.name}/{f}" for f in names), OVERVIEW)}
     for image in images:
         if image.resolve() in results:
             raise ConfigError(f"the results would overwrite the image {image}; give another folder with --out")
@@ -189,7 +198,7 @@ def _load_kernels(settings: Settings, ctrl_c: CtrlC) -> None:
 
 def _solve(job: Job, settings: Settings, out: Path, report: Report, ctrl_c: CtrlC) -> tuple[Result, Silhouette]:
     """Solve an image and write its results."""
-    silhouette = load_silhouette(job.image, name=job.name)
+    silhouette = load_silhouette(job.image, name=job.name, options=settings.picture)
     simulator, agent = settings.simulator(silhouette), settings.new_agent()
     with ctrl_c.searching():
         solution = solved(agent, simulator, settings.budget, ctrl_c.heeding(report.progress))
@@ -199,16 +208,15 @@ def _solve(job: Job, settings: Settings, out: Path, report: Report, ctrl_c: Ctrl
     sequence = solution.sequence
     sequence = replace(sequence, settings={**sequence.settings, **own})
     solution = replace(solution, sequence=sequence)
-    files = write_results(out / job.name, solution, silhouette, ctrl_c.shielded)
+    files = write_results(out / job.name, solution, silhouette, ctrl_c.shielded, with_mask=settings.show_mask)
     notes = [*job.notes, *silhouette.notes, *_notes_on_scoring(silhouette), *([lost] if lost else [])]
     return Result(job.image, job.name, solution, tuple(notes), files, losses), silhouette
 
 
 def _notes_on_scoring(silhouette: Silhouette) -> list[str]:
-    size = silhouette.resolution
-    return (
-        [f"fewer than {SMALL} pixels a side ({size}): r_sm is of exact areas"] if silhouette.is_scored_by_area else []
-    )
+    if not silhouette.is_scored_by_area:
+        return []
+    return [f"fewer than {SMALL} pixels a side ({silhouette.resolution}): r_sm is of exact areas"]
 
 
 def _write_overview(overview: Overview, out: Path, report: Report) -> Path | None:

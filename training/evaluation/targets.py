@@ -11,7 +11,7 @@ from typing import ClassVar, Literal
 from autopoly_env.errors import ConfigError, SilhouetteError
 from autopoly_env.files import file_stem
 from autopoly_env.sequence import ConstructionSequence
-from autopoly_env.silhouette import Silhouette, find_images, load_silhouette
+from autopoly_env.silhouette import DEFAULT_OPTIONS, ObjectOptions, Silhouette, find_images, load_silhouette
 from autopoly_env.targets import ConstructionTargets, ObjectTargets, split_seed
 from autopoly_env.targets.obj_file import read_obj
 from autopoly_env.targets.projection import silhouette_of
@@ -82,6 +82,7 @@ class FolderSpec:
 
     kind: Literal["folder"]
     root: str = ""  # a folder, or a pattern in which ** crosses folders
+    picture: ObjectOptions | None = None  # what in the pictures is the object; None leaves that to each
     n: int | None = None  # the first so many
 
     def targets(self) -> Sequence[Target]:
@@ -94,7 +95,7 @@ class FolderSpec:
             raise ConfigError(str(error)) from None
         stems = [file_stem(path).replace("\\", "_") for path in paths]
         names = _unlike(stems)
-        return [_ImageTarget(name, path.resolve()) for name, path in zip(names, paths, strict=True)]
+        return [_ImageTarget(name, path.resolve(), self.picture) for name, path in zip(names, paths, strict=True)]
 
 
 @dataclass(frozen=True)
@@ -150,9 +151,10 @@ class _ObjectTarget(Target):
 @dataclass(frozen=True)
 class _ImageTarget(Target):
     path: Path
+    picture: ObjectOptions | None = None
 
     def load(self) -> Silhouette:
-        return load_silhouette(self.path, name=self.name)
+        return load_silhouette(self.path, name=self.name, options=self.picture or DEFAULT_OPTIONS)
 
 
 @dataclass(frozen=True)
