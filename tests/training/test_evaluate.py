@@ -283,6 +283,17 @@ def test_run__goes_on_when_a_row_says_something_else_of_what_is_missing(run: Run
     assert done.code == 0 and "gone to Delphi" in done.out
 
 
+def test_rule_of_faces__is_a_key_of_the_suite_that_runs_of_before_have_not(run: Run) -> None:
+    assert run("tiny.yaml", "--out", "out", "--agents", "dr-simple").code == 0
+    info = json.loads(Path("out/run.json").read_text())
+    assert info["suite"].pop("faces") == "any"
+    Path("out/run.json").write_text(json.dumps(info))
+    assert run("tiny.yaml", "--out", "out", "--agents", "dr-simple", "--resume").code == 0
+    done = run("tiny.yaml", "--out", "out", "--agents", "dr-simple", "--faces", "quads", "--resume")
+    assert done.code == 1 and '(faces: "any" there, "quads" here)' in done.err
+    assert run("tiny.yaml", "--out", "ruled", "--agents", "dr-simple", "--faces", "quads").code == 0
+
+
 @pytest.mark.slow
 def test_ctrl_c__leaves_a_run_to_go_on_with() -> None:
     Path("tiny.yaml").write_text(SUITE.replace("n: 3", "n: 2000"))
