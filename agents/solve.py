@@ -68,7 +68,7 @@ def solve(
         ),
     ] = DEFAULT_AGENT,
     operators: Annotated[
-        str, typer.Option(help="paper, full, names, or my.module:my_operator, separated by commas.")
+        str, typer.Option(help="paper, full, modeller, names, or my.module:my_operator, separated by commas.")
     ] = "full",
     w_sm: Annotated[float, typer.Option(help="Weight of the IoU.")] = 100.0,
     w_sc: Annotated[float, typer.Option(help="Weight of the complexity V + E + F.")] = 0.3,

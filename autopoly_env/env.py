@@ -87,7 +87,7 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
     ## Arguments
 
     - `targets`: "construction", "objects", a folder of images, or a `TargetSource`; `split`: "train" or "test".
-    - `operators`: a preset ("paper", "full") or names with commas between them.
+    - `operators`: a preset ("paper", "full", "modeller") or names with commas between them.
     - `resolution`: pixels a side at which meshes are fitted and scored; `obs_resolution`: of the observed pictures.
     - `max_steps`, `max_vertices`, `match_threshold`: see above.
     - `reward_mode`, `illegal_penalty`, `w_sm`, `w_sc`, `w_si`: see above.
