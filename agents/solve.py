@@ -78,7 +78,7 @@ def solve(
         ),
     ] = DEFAULT_AGENT,
     operators: Annotated[
-        str, typer.Option(help="paper, full, names, or my.module:my_operator, separated by commas.")
+        str, typer.Option(help="paper, full, modeller, names, or my.module:my_operator, separated by commas.")
     ] = "full",
     faces: Annotated[str, typer.Option(help="Rule of faces: any, convex, or quads (convex, 3 or 4 corners).")] = "any",
     w_sm: Annotated[float, typer.Option(help="Weight of the IoU.")] = 100.0,

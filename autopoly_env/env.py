@@ -90,7 +90,7 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
     ## Arguments
 
     - `targets`: "construction", "objects", a folder of images, or a `TargetSource`; `split`: "train" or "test".
-    - `operators`: a preset ("paper", "full") or names with commas between them.
+    - `operators`: a preset ("paper", "full", "modeller") or names with commas between them.
     - `resolution`: pixels a side at which meshes are fitted and scored; `obs_resolution`: of the observed pictures.
     - `faces`: the rule of faces that every mesh keeps: "any", "convex", "quads" (convex, 3 or 4 corners).
     - `max_steps`, `max_vertices`, `match_threshold`: see above.

@@ -215,6 +215,14 @@ def test_face_inset__refuses_a_face_that_is_not_convex() -> None:
         assert "not convex or has no room" in refusal("face_inset", mesh, 0)
 
 
+def test_edge_fill__joins_two_parts() -> None:
+    corners = [(0, 0), (1, 0), (1, 1), (0, 1), (2, 0), (3, 0.5), (2, 1)]
+    mesh = PolyMesh.from_faces(corners, [(0, 1, 2, 3), (4, 5, 6)])
+    made = apply("edge_fill", mesh, edge(mesh, 1, 2), edge(mesh, 4, 6))
+    assert made.counts == (7, 9, 3)
+    assert made.topology.n_components == 1
+
+
 def test_edge_fill__makes_no_handle() -> None:
     """The outer rim of a ring and the rim of its hole are never joined, for no mesh in the plane has a handle."""
     mesh = ring()
