@@ -107,7 +107,7 @@ def test_iou__does_not_see_how_a_shape_is_divided_into_faces() -> None:
 @pytest.mark.parametrize("seed", range(8))
 def test_iou__of_a_polygon_equals_that_of_its_exact_areas(seed: int) -> None:
     points = star(seed, 9)
-    target = noise(seed, 16).target(16)
+    target = Target(noise(seed, 16).target(16).coverage)  # that counts pixels, small as it is
     drawn = shapely_coverage(shapely.Polygon(points), 16) >= 0.5
     expected = (drawn & target.mask).sum() / (drawn | target.mask).sum()
     assert intersection_over_union(polygon(points), target) == expected
