@@ -18,7 +18,7 @@ from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import Action, Choice
 from autopoly_env.score import Score
 from autopoly_env.sequence import ConstructionSequence
-from autopoly_env.sequence.file import Score as PlainScore
+from autopoly_env.sequence.file import PlainScore
 from autopoly_env.simulator import Simulator, State
 
 

@@ -23,9 +23,9 @@ FARTHEST = 1e6  # unit square, of a coordinate: farther out nothing can be compu
 SCORE_KEYS = ("iou", "complexity", "self_intersections", "total")
 
 Id = Annotated[int, Field(strict=True, ge=0, le=2**53)]  # as far as every reader of JSON counts exactly
-Place = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-FARTHEST, le=FARTHEST)]
+Coordinate = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-FARTHEST, le=FARTHEST)]
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Score = dict[str, Annotated[int, Field(strict=True, ge=-(2**53), le=2**53)] | Number]  # at least SCORE_KEYS
+PlainScore = dict[str, Annotated[int, Field(strict=True, ge=-(2**53), le=2**53)] | Number]  # at least SCORE_KEYS
 _STRICT = ConfigDict(extra="forbid")
 
 
@@ -56,8 +56,8 @@ class Step:
     choice: dict[str, Any] | None
     created: dict[str, list[Id]]  # {"vertices": [...], "faces": [...]}
     removed: dict[str, list[Id]]
-    moved: tuple[tuple[Id, Place, Place], ...]  # (vertex, x, y) wherever the operator itself had put it elsewhere
-    score: Score
+    moved: tuple[tuple[Id, Coordinate, Coordinate], ...]  # (vertex, x, y) where the operator itself put it elsewhere
+    score: PlainScore
     part: Label | None = None
 
 
@@ -65,11 +65,11 @@ class Step:
 class _Start:
     __pydantic_config__ = _STRICT
 
-    vertices: list[tuple[Id, Place, Place]]
+    vertices: list[tuple[Id, Coordinate, Coordinate]]
     faces: list[tuple[Id, list[Id]]]
     next_vertex_id: Id
     next_face_id: Id
-    score: Score
+    score: PlainScore
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class _Document:
 _DOCUMENT = TypeAdapter(_Document)
 
 
-def dump_json(settings: dict[str, Any], start: PolyMesh, start_score: Score, steps: tuple[Step, ...]) -> str:
+def dump_json(settings: dict[str, Any], start: PolyMesh, start_score: PlainScore, steps: tuple[Step, ...]) -> str:
     """The text of a sequence, a step a line. Raises SequenceError for what JSON has not, such as NaN."""
     ids = start.vertex_ids
     start_document = _Start(
@@ -102,7 +102,7 @@ def dump_json(settings: dict[str, Any], start: PolyMesh, start_score: Score, ste
     return f'{head},\n "start": {plain_json(asdict(start_document))},\n "steps": [\n  {lines}]}}\n'
 
 
-def parse_json(text: str) -> tuple[dict[str, Any], PolyMesh, Score, tuple[Step, ...]]:
+def parse_json(text: str) -> tuple[dict[str, Any], PolyMesh, PlainScore, tuple[Step, ...]]:
     """Settings, start mesh, its score and the steps of a text. Raises SequenceError if it is no sequence."""
     if len(text) > MOST_BYTES:
         raise SequenceError(f"the text has {len(text)} letters; expected at most {MOST_BYTES}")
@@ -125,7 +125,7 @@ def parse_json(text: str) -> tuple[dict[str, Any], PolyMesh, Score, tuple[Step, 
     return document.settings, _start_mesh(document.start), document.start.score, document.steps
 
 
-def check_score(score: Score, where: str) -> None:
+def check_score(score: PlainScore, where: str) -> None:
     """Raise SequenceError if an entry of SCORE_KEYS is missing, or out of its range."""
     missing = [key for key in SCORE_KEYS if key not in score]
     if missing:

@@ -18,7 +18,7 @@ from autopoly_env.sequence import variation
 from autopoly_env.sequence.file import (
     MOST_BYTES,
     MOST_CORNERS,
-    Score,
+    PlainScore,
     Step,
     check_label,
     check_score,
@@ -26,7 +26,7 @@ from autopoly_env.sequence.file import (
     parse_json,
     plain_json,
 )
-from autopoly_env.sequence.follower import Place
+from autopoly_env.sequence.follower import PointMap
 from autopoly_env.sequence.ids import choice_ids, decoded, operator_named
 from autopoly_env.shown import told
 
@@ -41,7 +41,7 @@ class ConstructionSequence:
 
     settings: dict[str, Any]  # anything JSON knows: what a reader needs in order to understand the scores
     start: PolyMesh
-    start_score: Score
+    start_score: PlainScore
     steps: tuple[Step, ...] = ()
 
     @classmethod
@@ -49,8 +49,8 @@ class ConstructionSequence:
         cls,
         settings: dict[str, Any],
         start: PolyMesh,
-        start_score: Score,
-        transitions: Iterable[tuple[Action, Choice | None, PolyMesh, Score]],
+        start_score: PlainScore,
+        transitions: Iterable[tuple[Action, Choice | None, PolyMesh, PlainScore]],
     ) -> "ConstructionSequence":
         """The sequence of `transitions` (action, its choice, the mesh after it, that mesh's score) from `start`.
 
@@ -204,7 +204,7 @@ class ConstructionSequence:
         steps = (replace(step, part=label) for step, label in zip(self.steps, labels, strict=True))
         return replace(self, steps=tuple(steps))
 
-    def moved_by(self, place: Callable[[int], Place]) -> "ConstructionSequence":
+    def moved_by(self, place: Callable[[int], PointMap]) -> "ConstructionSequence":
         """The same steps, the points of mesh number i (0 is the start) going where `place(i)` takes them.
 
         Raises SequenceError naming the step that is illegal then.
@@ -283,7 +283,7 @@ class ConstructionSequence:
             raise SequenceError(f"{path}: {error}") from None
 
 
-def _record_step(mesh: PolyMesh, action: Action, choice: Choice | None, after: PolyMesh, score: Score) -> Step:
+def _record_step(mesh: PolyMesh, action: Action, choice: Choice | None, after: PolyMesh, score: PlainScore) -> Step:
     operator, element = operator_named(action.operator), int(action.element)
     if choice is None:
         choice = operator.choice_at(mesh, element)

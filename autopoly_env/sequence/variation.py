@@ -11,18 +11,20 @@ No target is at hand: the meshes are scored against the picture of the last one,
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
 
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import AutoPolyError, SequenceError
 from autopoly_env.mesh import PolyMesh
+from autopoly_env.mesh import mirrored as mirrored_points
 from autopoly_env.operators import Action, Choice
 from autopoly_env.operators.wording import element_words
 from autopoly_env.raster import coverage
 from autopoly_env.score import ScoreWeights, score
 from autopoly_env.sequence.deformation import ThinPlate
-from autopoly_env.sequence.file import Score, Step
-from autopoly_env.sequence.follower import Follower, Place, Taken, mirror_image, moved_to
+from autopoly_env.sequence.file import PlainScore, Step
+from autopoly_env.sequence.follower import Follower, PointMap, Taken, mirror_image, moved_to
 from autopoly_env.silhouette import Silhouette
 
 _MOST_WEIGHT = 1e9  # that settings may tell; they are of any content
@@ -44,8 +46,8 @@ class Recording(NamedTuple):
 
     settings: dict[str, Any]
     start: PolyMesh
-    start_score: Score
-    transitions: list[tuple[Action, Choice | None, PolyMesh, Score]]
+    start_score: PlainScore
+    transitions: list[tuple[Action, Choice | None, PolyMesh, PlainScore]]
 
 
 def with_changes(old: Replayed, k: int, moved: Positions, choice: Mapping[str, Any] | None) -> Recording:
@@ -97,7 +99,7 @@ def without(old: Replayed, k: int) -> Recording:
     return _rescored(old.settings, meshes[0], taken)
 
 
-def moved_by(old: Replayed, place: Callable[[int], Place]) -> Recording:
+def moved_by(old: Replayed, place: Callable[[int], PointMap]) -> Recording:
     """The same steps, mesh number i moved by `place(i)`. Raises SequenceError naming the step that is illegal then."""
     meshes = old.meshes
     start = meshes[0].with_vertices(place(0)(meshes[0].vertices))
@@ -113,8 +115,9 @@ def mirrored(old: Replayed) -> Recording:
     meshes = old.meshes
     follower = Follower(meshes[0], mirror_image(meshes[0]), is_mirrored=True)
     start = follower.mesh
+    image = partial(mirrored_points, axis=0.5)
     taken = [
-        _told(i, step, follower.take, step, meshes[i - 1], meshes[i], _mirrored) for i, step in enumerate(old.steps, 1)
+        _told(i, step, follower.take, step, meshes[i - 1], meshes[i], image) for i, step in enumerate(old.steps, 1)
     ]
     return _rescored(old.settings, start, taken)
 
@@ -178,8 +181,3 @@ def _told(number: int, step: Step, take: Callable[..., Taken], *arguments: objec
 def stay(points: FloatArray) -> FloatArray:
     """Where points go that do not move."""
     return points
-
-
-def _mirrored(points: FloatArray) -> FloatArray:
-    mirrored: FloatArray = points * (-1.0, 1.0) + (1.0, 0.0)
-    return mirrored

@@ -11,7 +11,7 @@ from autopoly_env.files import write_atomically
 from training.evaluation.display import Display
 from training.evaluation.folder import begin, claim
 from training.evaluation.suite import GROUND_TRUTH, Suite, takes_seed
-from training.evaluation.targets import Target
+from training.evaluation.targets import SuiteTarget
 from training.evaluation.tasks import EvalTask, solve_task
 from training.parallel import check_engine, map_tasks
 from training.records import target_path
@@ -41,7 +41,7 @@ class TargetShard:
             raise ConfigError(f"--shard {text}: expected k/n with 1 <= k <= n, such as 1/4")
         return cls(int(k), int(n))
 
-    def of(self, targets: Sequence[Target]) -> Sequence[Target]:
+    def of(self, targets: Sequence[SuiteTarget]) -> Sequence[SuiteTarget]:
         """Its share of the targets."""
         return targets[self.k - 1 :: self.n]
 
@@ -93,7 +93,7 @@ def run_suite(
                 display.done(result.task, record)
 
 
-def _players(suite: Suite, target: Target, missing: Collection[str], only: set[str]) -> Iterator[tuple[str, int]]:
+def _players(suite: Suite, target: SuiteTarget, missing: Collection[str], only: set[str]) -> Iterator[tuple[str, int]]:
     """Label and seed of all who try a target; who does not draw tries it once."""
     if target.is_known and (not only or GROUND_TRUTH in only):
         yield GROUND_TRUTH, suite.seeds[0]

@@ -26,7 +26,7 @@ from autopoly_env.files import write_atomically
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.sequence import ConstructionSequence, Lesson, Step, parts_of
 from autopoly_env.sequence.effort import groups_to_move, seconds_of
-from autopoly_env.sequence.file import Score
+from autopoly_env.sequence.file import PlainScore
 from autopoly_env.sequence.ids import decoded
 from autopoly_env.silhouette import Silhouette
 
@@ -114,7 +114,7 @@ def _page_data(sequence: ConstructionSequence, target: Silhouette | None, title:
     }
 
 
-def _pose(mesh: PolyMesh, score: Score, words: Words) -> dict[str, Any]:
+def _pose(mesh: PolyMesh, score: PlainScore, words: Words) -> dict[str, Any]:
     """What the page knows of a step: where everything is after it, what it is worth and what there is to say."""
     ids = mesh.vertex_ids
     return {
