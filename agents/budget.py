@@ -123,7 +123,7 @@ class Meter:
             if limit is not None and used[name] >= limit:
                 self.stopped_by = name
                 break
-        if max(self._n_nodes, self._n_simulations) >= self._most_states:
+        if self.stopped_by == "finished" and max(self._n_nodes, self._n_simulations) >= self._most_states:
             self.stopped_by = "states"
         if self._whole is not None and self._whole.spent():
             self.stopped_by = self._whole.stopped_by

@@ -353,9 +353,10 @@ def _checked_step(env: Any, action: int, before: dict[str, Any], where: str) -> 
     _require(types[0] == types[1], f"{where}: the infos have other keys or types than before")
     illegal = mask[action] == 0
     invalid = info["invalid_action"]
-    known = illegal or info["action_mask"][action] == 0  # which has no room, as is known now
-    _require(invalid == illegal or (invalid and known), f"{where}: invalid_action is wrong about action {action}")
-    _require(not invalid or info["r_all"] == before["r_all"], f"{where}: an illegal action changed the shape")
+    is_same = info["r_all"] == before["r_all"]
+    has_no_room = is_same and info["action_mask"][action] == 0  # as is known now
+    _require(invalid == illegal or (invalid and has_no_room), f"{where}: invalid_action is wrong about action {action}")
+    _require(is_same or not illegal, f"{where}: an illegal action changed the shape")
     return tuple(outcome)
 
 

@@ -3,6 +3,7 @@
 from typing import Any
 
 from agents.baselines.random_agent import RandomAgent, RandomConfig
+from autopoly_env.errors import IllegalActionError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import OPERATORS, Action
 from autopoly_env.sequence import ConstructionSequence
@@ -41,6 +42,9 @@ def played(seed: int, n_steps: int = 25) -> ConstructionSequence:
     agent = RandomAgent(RandomConfig(seed=seed, n_steps=n_steps))
     states = [simulator.initial()]
     while not states[-1].done:
-        states.append(simulator.transition(states[-1], agent.act(simulator, states[-1]).action))
+        try:
+            states.append(simulator.transition(states[-1], agent.act(simulator, states[-1]).action))
+        except IllegalActionError:  # it has no room
+            states[-1] = simulator.idle(states[-1])
     steps = [(state.action, state.choice, state.mesh, SCORE) for state in states[1:] if state.action is not None]
     return ConstructionSequence.record({"target": f"noise {seed}"}, states[0].mesh, SCORE, steps)
