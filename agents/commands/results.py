@@ -15,6 +15,7 @@ from PIL import Image
 
 from agents.solution import Solution
 from autopoly_env import viewer
+from autopoly_env.arguments import is_count
 from autopoly_env.arrays import ByteArray
 from autopoly_env.errors import OutputError
 from autopoly_env.export import contact_sheet, save_html, save_png, to_obj, to_svg
@@ -88,7 +89,7 @@ def _sweep(folder: Path) -> None:
     """Remove the staging folders of runs on this machine that are not there any more."""
     for left in folder.glob(f"{_STAGING}*.tmp"):
         owner = left.name.removeprefix(_STAGING).partition("-")[0]
-        if not (owner.isdecimal() and _is_running(int(owner))) and time.time() - left.stat().st_mtime > _PATIENCE:
+        if not (is_count(owner) and _is_running(int(owner))) and time.time() - left.stat().st_mtime > _PATIENCE:
             shutil.rmtree(left, ignore_errors=True)
 
 
