@@ -18,6 +18,11 @@ _Value = TypeVar("_Value")
 LARGEST = 2**63 - 1  # whole number that kernels and random numbers take
 
 
+def is_count(text: str) -> bool:
+    """Whether a text is a whole number from 0, of at most 18 digits."""
+    return text.isascii() and text.isdecimal() and len(text) <= 18
+
+
 def one_of(name: str, value: _Value, allowed: tuple[_Value, ...]) -> _Value:
     """The value, if it is allowed. Raises ConfigError otherwise."""
     if value not in allowed:

@@ -9,6 +9,7 @@ import typer
 from agents.commands.progress import TASK, progress_bar
 from agents.commands.running import FAILURE, TOLD, run_command
 from agents.commands.screen import say
+from autopoly_env.arguments import is_count
 from autopoly_env.errors import ConfigError
 
 HELP = """Make data sets of targets, check them, draw silhouettes of 3-D models.
@@ -193,7 +194,7 @@ def _build(
 def _range(text: str) -> tuple[int, int]:
     """ "3" or "1-5" as the least and the most."""
     least, _, most = text.partition("-")
-    if not least.isdecimal() or not (most or least).isdecimal():
+    if not is_count(least) or not is_count(most or least):
         raise ConfigError(f"--difficulty {text}: expected a number or a range, such as 3 or 1-5")
     return int(least), int(most or least)
 

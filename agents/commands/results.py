@@ -16,6 +16,7 @@ from PIL import Image, ImageOps
 from agents.commands.pictures import MASK, save_mask
 from agents.solution import Solution
 from autopoly_env import viewer
+from autopoly_env.arguments import is_count
 from autopoly_env.arrays import ByteArray
 from autopoly_env.details import Losses
 from autopoly_env.errors import AutoPolyError, OutputError
@@ -100,7 +101,7 @@ def _sweep(folder: Path) -> None:
     """Remove the staging folders of runs on this machine that are not there any more."""
     for left in folder.glob(f"{_STAGING}*.tmp"):
         owner = left.name.removeprefix(_STAGING).partition("-")[0]
-        if not (owner.isdecimal() and _is_running(int(owner))) and time.time() - left.stat().st_mtime > _PATIENCE:
+        if not (is_count(owner) and _is_running(int(owner))) and time.time() - left.stat().st_mtime > _PATIENCE:
             shutil.rmtree(left, ignore_errors=True)
 
 

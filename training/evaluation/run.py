@@ -6,8 +6,10 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from autopoly_env.arguments import is_count
 from autopoly_env.errors import ConfigError, OutputError
 from autopoly_env.files import write_atomically
+from autopoly_env.shown import short
 from training.evaluation.display import Display
 from training.evaluation.folder import begin, claim
 from training.evaluation.suite import GROUND_TRUTH, Suite, takes_seed
@@ -37,8 +39,8 @@ class TargetShard:
     def parse(cls, text: str) -> "TargetShard":
         """The shard "k/n". Raises ConfigError."""
         k, slash, n = text.partition("/")
-        if not (slash and k.isdecimal() and n.isdecimal() and 1 <= int(k) <= int(n)):
-            raise ConfigError(f"--shard {text}: expected k/n with 1 <= k <= n, such as 1/4")
+        if not (slash and is_count(k) and is_count(n) and 1 <= int(k) <= int(n)):
+            raise ConfigError(f"--shard {short(text)}: expected k/n with 1 <= k <= n, such as 1/4")
         return cls(int(k), int(n))
 
     def of(self, targets: Sequence[SuiteTarget]) -> Sequence[SuiteTarget]:
