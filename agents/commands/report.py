@@ -41,6 +41,7 @@ FORMATS = {  # of the numbers that a table can show, each and as a mean
 COLUMNS = ("r_sm", "r_sc", "r_si", "r_all", "actions", "valid", "blocking_in", "moved", "refits", "seconds")
 WARNING = "warning:"
 MOST_NOTES = 8  # lines of notes below a table
+LOST = " the mesh "  # in notes on what a mesh has lost
 MOST_NAMES = 4  # names of images in such a line
 PLAIN_WIDTH = 120  # of a table that goes to a file
 
@@ -164,11 +165,11 @@ def _table(rows: dict[str, dict[str, float]], columns: tuple[str, ...]) -> Table
 
 
 def _note_lines(notes: dict[str, list[str]], n_images: int) -> list[str]:
-    """A line for every note that images share, those of most images first."""
+    """A line for every note that images share: what is lost first, then those of most images."""
     if n_images == 1:
         return [f"notes: {'; '.join(notes)}"] if notes else []
     lines = []
-    for note, names in sorted(notes.items(), key=lambda item: -len(item[1])):
+    for note, names in sorted(notes.items(), key=lambda item: (LOST not in item[0], -len(item[1]))):
         first, n_more = ", ".join(names[:MOST_NAMES]), len(names) - MOST_NAMES
         whose = f"all {n_images} images" if len(names) == n_images else first
         lines.append(f"note: {note}: {whose}" + (f" and {n_more} more" if whose == first and n_more > 0 else ""))

@@ -173,11 +173,12 @@ def test_iou__of_a_small_picture_is_that_of_the_shapes(seed: int, resolution: in
     pixels = shapely.union_all([shapely.box(x, y, x + 1, y + 1) for y, x in np.argwhere(mask)])
     shape = shapely.Polygon(mesh.vertices[list(mesh.faces[0])] * resolution)
     expected = shape.intersection(pixels).area / shape.union(pixels).area
-    target = Silhouette(mask).target(resolution)
-    assert target.by_area
+    target = Target(mask.astype(np.float64), by_area=True)
     assert intersection_over_union(mesh, target) == pytest.approx(expected, abs=1e-9)
 
 
-def test_iou__of_other_pictures_counts_pixels() -> None:
+def test_iou__counts_areas_of_small_pictures_but_not_of_slanting_lines() -> None:
+    assert painted(SQUARE, 32).target(32).by_area
+    assert not Silhouette(np.eye(32, dtype=np.bool_)).target(32).by_area
     assert not painted(SQUARE, 64).target(64).by_area
     assert not painted(SQUARE, 32).target(64).by_area  # blocks of a small one, as a refit sees it
