@@ -22,6 +22,7 @@ CANDIDATES = 5  # colours of the border that may be the background's
 CORNER_VOTE = 0.15  # what each corner adds to the share of its colour
 FIELD_GAIN = 0.08  # by which a field must explain more of it
 FIELD_ORDERS = (2, 3, 4, 4, 4)  # of the polynomials that are fitted one after the other
+BLOCK = 2**13  # pixels whose distances are taken at a time
 MOST_POINTS = 4096  # of the border that are looked at
 
 Frame = tuple[int, int, int, int]  # pixels at the top, bottom, left, right
@@ -50,12 +51,24 @@ class Background:
 
     def distances(self, features: Float32Array) -> Float32Array:
         """How far (H, W) every pixel is from the background."""
+        if self.field is None:
+            return _distances_from(self.colour, features)
         squares = np.zeros(features.shape[:2], dtype=np.float32)
         for channel in range(features.shape[2]):
-            expected = self.colour[channel] if self.field is None else _evaluated(self.field[channel], features.shape)
-            squares += np.square(features[..., channel] - expected)
+            squares += np.square(features[..., channel] - _evaluated(self.field[channel], features.shape))
         distances: Float32Array = np.sqrt(squares, out=squares)
         return distances
+
+
+def _distances_from(colour: Float32Array, features: Float32Array) -> Float32Array:
+    """How far (H, W) every pixel is from a colour; some rows at a time, so that they stay in the cache."""
+    height, width, _ = features.shape
+    distances = np.empty((height, width), dtype=np.float32)
+    n_rows = max(1, BLOCK // width)
+    for top in range(0, height, n_rows):
+        apart = features[top : top + n_rows] - colour
+        np.sqrt(np.einsum("hwc,hwc->hw", apart, apart), out=distances[top : top + n_rows])
+    return distances
 
 
 def find_background(features: Float32Array) -> Background:
