@@ -14,12 +14,15 @@ FRAME_PURE = 0.9  # share of a line that has to be frame
 STUDIED = 100  # pixels a side, about: a field of light is fitted to so many
 FADING = 0.12  # a field that varies less along the border is even light
 EVEN_ENOUGH = 0.85  # share of the border that one colour explains: no field is tried
-FLAT, FLAT_SHARE = 0.01, 0.3  # nor where so much of it is of one colour to the letter, as in drawings
+FLAT, FLAT_SHARE = 0.01, 0.3  # nor where so much of it is of one colour to the letter, as in drawings,
+DRIFTING, SMOOTH = 0.2, 0.8  # but not if so much of the border is nearly of that colour, in steps that are so smooth
+STEP, LEVELS = 0.004, 4  # and on so many levels: then the light fades a little
 FLAT_SUPPORT = 0.9  # of what is that flat: an object may hide the rest of the border
 CANDIDATES = 5  # colours of the border that may be the background's
 CORNER_VOTE = 0.15  # what each corner adds to the share of its colour
 FIELD_GAIN = 0.08  # by which a field must explain more of it
 FIELD_ORDERS = (2, 3, 4, 4, 4)  # of the polynomials that are fitted one after the other
+BLOCK = 2**13  # pixels whose distances are taken at a time
 MOST_POINTS = 4096  # of the border that are looked at
 
 Frame = tuple[int, int, int, int]  # pixels at the top, bottom, left, right
@@ -48,12 +51,24 @@ class Background:
 
     def distances(self, features: Float32Array) -> Float32Array:
         """How far (H, W) every pixel is from the background."""
+        if self.field is None:
+            return _distances_from(self.colour, features)
         squares = np.zeros(features.shape[:2], dtype=np.float32)
         for channel in range(features.shape[2]):
-            expected = self.colour[channel] if self.field is None else _evaluated(self.field[channel], features.shape)
-            squares += np.square(features[..., channel] - expected)
+            squares += np.square(features[..., channel] - _evaluated(self.field[channel], features.shape))
         distances: Float32Array = np.sqrt(squares, out=squares)
         return distances
+
+
+def _distances_from(colour: Float32Array, features: Float32Array) -> Float32Array:
+    """How far (H, W) every pixel is from a colour; some rows at a time, so that they stay in the cache."""
+    height, width, _ = features.shape
+    distances = np.empty((height, width), dtype=np.float32)
+    n_rows = max(1, BLOCK // width)
+    for top in range(0, height, n_rows):
+        apart = features[top : top + n_rows] - colour
+        np.sqrt(np.einsum("hwc,hwc->hw", apart, apart), out=distances[top : top + n_rows])
+    return distances
 
 
 def find_background(features: Float32Array) -> Background:
@@ -61,13 +76,25 @@ def find_background(features: Float32Array) -> Background:
     points = _thinned(border(features))
     colour, share = dominant(points, features[[0, 0, -1, -1], [0, -1, 0, -1]])
     residuals = np.linalg.norm(points - colour, axis=1)
-    is_flat = float((residuals < FLAT).mean()) >= FLAT_SHARE
+    is_flat = float((residuals < FLAT).mean()) >= FLAT_SHARE and not _fades_a_little(features, colour)
     noise = _noise(residuals[residuals < FLAT] if is_flat else residuals)
     found = Background(colour, None, share, noise, is_flat)
     if share >= EVEN_ENOUGH or is_flat or min(features.shape[:2]) < 16:
         return found
     fading = _fading(features)
     return found if fading is None or fading.share < share + FIELD_GAIN else fading
+
+
+def _fades_a_little(features: Float32Array, colour: Float32Array) -> bool:
+    """Whether much of the border drifts off from a colour, in small steps and many of them."""
+    lines = (features[0], features[-1], features[:, 0], features[:, -1])
+    away = np.concatenate([np.linalg.norm(line - colour, axis=1) for line in lines])
+    near = (away > FLAT) & (away < SAME)
+    if near.mean() < DRIFTING:
+        return False
+    steps = np.abs(np.diff(away))[near[1:]]
+    n_levels = int((np.bincount((away[near] / STEP).astype(int)) >= 0.05 * near.sum()).sum())
+    return bool((steps < FLAT).mean() >= SMOOTH and n_levels >= LEVELS)
 
 
 def find_frame(features: Float32Array) -> Frame:

@@ -70,15 +70,16 @@ def _is_dusty(distances: Float32Array, noise: float, level: float) -> bool:
 def beyond_cut(distances: Float32Array, level: float) -> BoolArray:
     """The mask (H, W) of what lies beyond the cut, its antialiased edge cut where it is half as different as inside."""
     mask: BoolArray = distances > level
-    padded = np.pad(distances, 2)
+    height, width = mask.shape
     for _ in range(PEELED):
         rows, columns = np.nonzero(_outermost(mask))
         if not len(rows):
             break
         strongest = distances[rows, columns]
-        for down in range(5):
-            for right in range(5):
-                strongest = np.maximum(strongest, padded[rows + down, columns + right])
+        for down in range(-2, 3):
+            for right in range(-2, 3):
+                beside = (np.clip(rows + down, 0, height - 1), np.clip(columns + right, 0, width - 1))
+                strongest = np.maximum(strongest, distances[beside])
         soft = distances[rows, columns] < 0.5 * strongest
         if not soft.any():
             break
