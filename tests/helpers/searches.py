@@ -36,6 +36,9 @@ class Game:
         self.expanded += "".join(action.operator for action in actions)
         return [self.states[action.operator] for action in actions]
 
+    def hairlines(self, _mesh: PolyMesh) -> int:
+        return 0
+
 
 class InOrder(UniformEvaluator):
     """Thinks of actions as they are listed, the first the likeliest by a hair, and expands them uniformly."""

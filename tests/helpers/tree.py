@@ -39,6 +39,12 @@ class Tree:
         self.visited.append(self.name(state))
         return [self.states[child] for child in self.children.get(self.name(state), "")]
 
+    def is_sound(self, _mesh: PolyMesh) -> bool:
+        return True
+
+    def standing(self, state: State) -> float:
+        return state.score.total
+
     def search(self, budget: Budget | None = None, **options: Any) -> tuple[str, str]:
         """(the nodes visited, the best node) of a beam search from node r."""
         agent, root = BeamAgent(BeamConfig(**options)), Track(self.states["r"])
