@@ -33,7 +33,7 @@ def one_of(name: str, value: _Value, allowed: tuple[_Value, ...]) -> _Value:
 def whole(name: str, value: Any, at_least: int = 0, at_most: int = LARGEST) -> int:
     """The value, a whole number of at least and at most so much. Raises ConfigError otherwise."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or not at_least <= value <= at_most:
-        bounds = f"of at least {at_least}" if at_most == LARGEST else f"from {at_least} to {at_most}"
+        bounds = f"of at least {at_least}" + (f", at most {at_most}" if at_most < LARGEST else "")
         raise ConfigError(f"{name}={short(value)}: expected a whole number {bounds}")
     return int(value)
 

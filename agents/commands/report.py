@@ -106,7 +106,7 @@ class Report:
         self._bar.advance(TASK)
         if self._as_json:
             _print_record({"image": what, "error": problem})
-        self.say(f"error: {problem}" if what in problem else f"error: {what}: {problem}")
+        self.say(told(f"error: {problem}" if what in problem else f"error: {what}: {problem}"))
 
     def say(self, text: str) -> None:
         """A line on stderr, above the progress bar."""
