@@ -2,16 +2,17 @@
 
 import numpy as np
 
-from autopoly_env.arrays import Float32Array
+from autopoly_env.arrays import BoolArray, Float32Array
 from autopoly_env.errors import SilhouetteError
 from autopoly_env.silhouette.background import Background, find_background
 from autopoly_env.silhouette.colours import hex_of, oklab, parse_colour
-from autopoly_env.silhouette.difference import beyond_cut, choose_cut
+from autopoly_env.silhouette.difference import STUDIED, beyond_cut, choose_cut
 from autopoly_env.silhouette.opinion import Opinion, View
 from autopoly_env.silhouette.options import ObjectOptions
 
 BLURRED = 0.7  # of the support of a sharp outline
 PRESENT, PRESENT_SHARE = 0.1, 1e-4  # a colour is in the picture if so many pixels are so close to it
+HOLLOW, LOWERED = 0.1, 0.02  # so much of an object is hole: worth a word, if a cut so low may find more of it
 LIKE = 0.12  # of the object's colour is what is this close to it, where nothing was said about the background
 
 
@@ -35,7 +36,20 @@ def opinion(view: View) -> Opinion | None:
         remarks = ["warning: the light is uneven: is it a photo?"]
     if not cut.is_sharp:
         remarks.append("the outline is soft: --threshold says where it is cut")
+    enclosed = _enclosed_share(mask) if cut.level > LOWERED else 0.0
+    if enclosed > HOLLOW:
+        words = f"{enclosed:.0%} of what its outline encloses looks like the background"
+        remarks.append(f"{words}: --background '{name}' --threshold {LOWERED} takes more of it")
     return Opinion(mask, tuple(notes), support, tuple(remarks), name, background.is_flat)
+
+
+def _enclosed_share(mask: BoolArray) -> float:
+    """The share of holes in what the outline encloses, judged on about STUDIED pixels a side."""
+    from scipy.ndimage import binary_fill_holes
+
+    step = max(1, max(mask.shape) // STUDIED)
+    small = mask[::step, ::step]
+    return 1.0 - float(small.sum()) / max(1, int(binary_fill_holes(small).sum()))
 
 
 def asked(label: str, view: View, options: ObjectOptions) -> Opinion:

@@ -8,6 +8,7 @@ from autopoly_env.silhouette.options import ObjectOptions
 
 MIN_SPECK, SPECK_SHARE = 4, 2e-5  # smaller components are specks, smaller holes pinholes: pixels, of the picture's area
 SMALL_SHARE = 0.0025  # of a small picture's area, in which a pixel is a detail
+FEW = 8  # parts
 PATTERN = 0.5  # of the object: so many specks are no dirt, they are what is drawn
 
 
@@ -87,6 +88,10 @@ def _smaller_than(n_pixels: int, labels: IntArray, count: int) -> tuple[BoolArra
     """Where the labelled parts with fewer than `n_pixels` pixels are, and how many of them there are."""
     if n_pixels <= 1 or count == 0:
         return np.zeros(labels.shape, dtype=bool), 0
-    small = np.bincount(labels[labels > 0], minlength=count + 1) < n_pixels
+    if count <= FEW:  # much quicker than to count them all
+        sizes = np.array([0, *(np.count_nonzero(labels == number) for number in range(1, count + 1))])
+    else:
+        sizes = np.bincount(labels.ravel(), minlength=count + 1)
+    small = sizes < n_pixels
     small[0] = False
     return small[labels] if small.any() else np.zeros(labels.shape, dtype=bool), int(small.sum())

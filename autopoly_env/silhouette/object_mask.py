@@ -144,7 +144,8 @@ def _chosen(view: View) -> Opinion | None:
     if apart <= AGREED and not lightness.is_clear and (colour.is_clear or colour.support >= TRUSTED):
         return colour.saying(*colour.remarks)
     if apart <= AGREED:
-        return Opinion(lightness.mask, (*lightness.notes, *colour.remarks), max(colour.support, lightness.support))
+        warnings = [remark for remark in colour.remarks if remark.startswith("warning")]
+        return Opinion(lightness.mask, (*lightness.notes, *warnings), max(colour.support, lightness.support))
     if colour.is_clear or colour.support >= (lightness.support if lightness.is_clear else TRUSTED):
         other = "light" if "lighter" in lightness.notes[1] else "dark"
         share = f"{_share(lightness.mask, colour.mask)} of this: --object {other}"

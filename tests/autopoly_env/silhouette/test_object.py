@@ -197,6 +197,17 @@ def test_noise__is_refused_and_an_honest_pattern_is_not() -> None:
     assert iou(load_silhouette(salted).mask, chair()) > 0.95
 
 
+def test_object__that_is_hollow_for_its_ground_is_like_it_says_how_to_take_more() -> None:
+    rng = np.random.default_rng(0)
+    picture = painted(disc(SIZE, 0.4), (40, 60, 90), (200, 200, 200)).astype(int)
+    picture[disc(SIZE, 0.4) & (np.arange(SIZE) > 48)] = (230, 120, 40)
+    picture[disc(SIZE, 0.3)] = (206, 206, 214)
+    noisy = np.clip(picture + rng.integers(-6, 7, picture.shape), 0, 255).astype(np.uint8)
+    silhouette = load_silhouette(noisy)
+    assert iou(silhouette.mask, disc(SIZE, 0.4) & ~disc(SIZE, 0.3)) > 0.95
+    assert says(silhouette, "of what its outline encloses looks like the background: --background")
+
+
 # --- dirt ---
 
 

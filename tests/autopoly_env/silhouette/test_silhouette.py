@@ -19,7 +19,7 @@ from hypothesis.extra import numpy as hnp
 from PIL import Image, ImageFilter, ImageOps
 
 from autopoly_env.errors import ConfigError, SilhouetteError
-from autopoly_env.silhouette import ObjectOptions, Silhouette, Target, find_images, load_silhouette
+from autopoly_env.silhouette import IMAGE_SUFFIXES, ObjectOptions, Silhouette, Target, find_images, load_silhouette
 from tests.helpers.paths import ROOT
 
 
@@ -466,6 +466,34 @@ def test_find_images__expands_files_directories_and_patterns(tmp_path: Path) -> 
     assert find_images([str(tmp_path / "**" / "*.webp")]) == [c]
     assert find_images([odd, tmp_path / "notes.txt"]) == [odd, tmp_path / "notes.txt"]
     assert find_images([]) == []
+
+
+def test_find_images__knows_every_kind_that_pillow_reads_by_itself() -> None:
+    Image.init()
+    readable = {suffix for suffix, kind in Image.registered_extensions().items() if kind in Image.OPEN}
+    elsewhere = {
+        ".bufr",
+        ".emf",
+        ".eps",
+        ".grib",
+        ".h5",
+        ".hdf",
+        ".iim",
+        ".mpeg",
+        ".mpg",
+        ".ps",
+        ".wmf",
+    }  # with a program
+    assert readable - elsewhere <= set(IMAGE_SUFFIXES)
+
+
+def test_find_images__tells_what_it_left_out_of_a_directory(tmp_path: Path) -> None:
+    (tmp_path / "below").mkdir()
+    for file_name in ("a.png", "b.avif", "notes.txt", ".hidden", "c.pbm"):
+        (tmp_path / file_name).touch()
+    skipped: list[Path] = []
+    assert [path.name for path in find_images([tmp_path], skipped)] == ["a.png", "b.avif", "c.pbm"]
+    assert skipped == [tmp_path / "notes.txt"]
 
 
 def test_find_images__names_what_gave_no_image(tmp_path: Path) -> None:
