@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 from agents.budget import Budget, Meter, Progress
 from agents.finish import finish
 from agents.solution import Solution, Track
-from autopoly_env.errors import ConfigError, ConformanceError
+from autopoly_env.errors import ConfigError, ConformanceError, IllegalActionError
 from autopoly_env.operators import STOP, Action
 from autopoly_env.simulator import Simulator, State
 
@@ -64,17 +64,27 @@ class Agent(ABC):
         try:
             meter.add([best.state])
             for track in self._search(simulator, best, meter):
-                if track.state.score.total > best.state.score.total:
+                if simulator.standing(track.state) > simulator.standing(best.state):
                     best = track
         except KeyboardInterrupt:
             meter.stopped_by = "interrupted"
         return finish(simulator, best.states(), meter)
 
     def _search(self, simulator: Simulator, track: Track, meter: Meter) -> Iterator[Track]:
-        """Play from `track` on until it is over or the budget is spent; yield what might be the best so far."""
+        """Play from `track` on until it is over or the budget is spent; yield what might be the best so far.
+
+        All refits count that the simulator does meanwhile, those of `act` among them. A step without room is idle.
+        """
         while not track.state.done and not meter.spent():
-            state = simulator.transition(track.state, self._decided(simulator, track.state).action)
-            meter.add([state])
+            n_before = simulator.n_refits
+            action = self._decided(simulator, track.state).action
+            try:
+                state = simulator.transition(track.state, action)
+            except IllegalActionError:
+                if action not in simulator.legal_actions(track.state):
+                    raise
+                state = simulator.idle(track.state)
+            meter.add([state], simulator.n_refits - n_before)
             track = Track(state, track)
             yield track
 

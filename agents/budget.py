@@ -8,14 +8,23 @@ from typing import TypeVar
 
 from agents.solution import Stats
 from autopoly_env.errors import ConfigError
+from autopoly_env.shown import short
 from autopoly_env.simulator import State
 
 _Start = TypeVar("_Start")
 
 
+# A tree search is bounded also where its states cost no refit, as those of WarpNet, or nothing new is made.
+STATES_A_REFIT = 200  # states of a tree, and simulations, for each refit of the budget
+MOST_STATES = 200_000  # whatever the budget is: about 2 GB
+
+
 @dataclass(frozen=True)
 class Budget:
-    """How much work a solve may do; None is no limit. It is looked at between steps: one may overrun it."""
+    """How much work a solve may do; None is no limit. It is looked at between steps: one may overrun it.
+
+    A tree has at most `MOST_STATES` states, and `STATES_A_REFIT` for each refit where these are limited.
+    """
 
     refits: int | None = None
     seconds: float | None = None
@@ -23,8 +32,11 @@ class Budget:
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            if value is not None and not value >= 0:
-                raise ConfigError(f"a budget of {value} {name}: expected at least 0")
+            if value is not None and (name == "seconds" or isinstance(value, int)) and value >= 0:
+                continue
+            if value is not None:
+                kind = "a number" if name == "seconds" else "a whole number"
+                raise ConfigError(f"a budget of {short(value)} {name}: expected {kind} of at least 0")
 
     def share(self, part: float) -> "Budget":
         """A part, 0 to 1, of it."""
@@ -55,6 +67,8 @@ class Meter:
         self, budget: Budget, on_progress: Callable[[Progress], None] | None = None, whole: "Meter | None" = None
     ) -> None:
         self._budget = budget
+        n_refits = MOST_STATES if budget.refits is None else STATES_A_REFIT * budget.refits
+        self._most_states = min(MOST_STATES, n_refits)
         self._on_progress = on_progress
         self._whole = whole
         self._began = time.perf_counter()
@@ -75,10 +89,13 @@ class Meter:
         """A meter for as much of what is left."""
         return Meter(budget, whole=self)
 
-    def add(self, states: Sequence[State]) -> None:
-        """Note the states that one step of work produced."""
+    def add(self, states: Sequence[State], n_refits: int = 0) -> None:
+        """Note the states that one step of work produced.
+
+        `n_refits` that the simulator has counted meanwhile are more than those of the states where some had no room.
+        """
         best = max((state.score.total for state in states), default=float("-inf"))
-        self.count(sum(state.n_refits for state in states), best)
+        self.count(max(n_refits, sum(state.n_refits for state in states)), best)
 
     def add_simulation(self, n_nodes: int) -> None:
         """Note a simulation that made so many new nodes, before what it did is added or counted."""
@@ -110,6 +127,8 @@ class Meter:
             if limit is not None and used[name] >= limit:
                 self.stopped_by = name
                 break
+        if self.stopped_by == "finished" and max(self._n_nodes, self._n_simulations) >= self._most_states:
+            self.stopped_by = "states"
         if self._whole is not None and self._whole.spent():
             self.stopped_by = self._whole.stopped_by
         return self.stopped_by != "finished"

@@ -1,11 +1,12 @@
 """Holding agents to their word where their results are used: in commands, in evaluations, as seeds of a search."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from agents.base import Agent, full_name
 from agents.budget import Budget, Progress
-from agents.solution import Solution, Stats
+from agents.solution import OVER_BUDGET, Solution, Stats
 from autopoly_env import outside
 from autopoly_env.errors import ConformanceError
 from autopoly_env.mesh import PolyMesh
@@ -22,11 +23,12 @@ def solved(
     budget: Budget | None = None,
     on_progress: Callable[[Progress], None] | None = None,
 ) -> Solution:
-    """What `agent.solve` returns, if that is a solution.
+    """What `agent.solve` returns, if that is a solution; its refits are those that the simulator has counted.
 
     Raises ConformanceError, in one line that names the agent's module, if it is none, and if an agent from outside this
     package raises an exception: with the line of its module. Ours raise what they raise.
     """
+    n_before = simulator.n_refits
     try:
         solution = agent.solve(simulator, budget, on_progress)
     except ConformanceError:
@@ -38,7 +40,18 @@ def solved(
         what = outside.described(error, module)
         raise ConformanceError(f"{what}, from {full_name(agent)}; expected a Solution from its solve") from error
     _check(solution, full_name(agent))
-    return solution
+    return _counted(solution, simulator.n_refits - n_before, budget)
+
+
+def _counted(solution: Solution, n_refits: int, budget: Budget | None) -> Solution:
+    """The solution with the refits that the simulator has counted, where these are more than the agent has."""
+    stats = solution.stats
+    if n_refits <= stats.n_refits:
+        return solution
+    limit = None if budget is None else budget.refits
+    is_over = limit is not None and n_refits > limit
+    reason = OVER_BUDGET if is_over and stats.stopped_by != "interrupted" else stats.stopped_by
+    return replace(solution, stats=replace(stats, n_refits=n_refits, stopped_by=reason))
 
 
 def _check(solution: Any, who: str) -> None:

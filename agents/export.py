@@ -1,5 +1,6 @@
 """The command `python -m agents.export`: construction sequences as pages, drawings, meshes, pictures and scripts."""
 
+import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -7,11 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from agents.commands import pictures
 from agents.commands.operators import OutsideOperators, know
 from agents.commands.running import FAILURE, complain, run_command
 from autopoly_env.errors import AutoPolyError, ConfigError, OutputError, SequenceError
 from autopoly_env.export.formats import LISTED, Export, Format, find_format, format_of, formats
 from autopoly_env.outside import described
+from autopoly_env.shown import tame
 
 if TYPE_CHECKING:
     from autopoly_env.sequence import ConstructionSequence
@@ -76,6 +79,13 @@ def export(
         float, typer.Option(help="Thickness of the mesh, in units of the unit square, in formats that show it.")
     ] = 0.0,
     operators: OutsideOperators = None,
+    object_: pictures.Object = "auto",
+    background: pictures.Background = None,
+    threshold: pictures.Threshold = None,
+    alpha_threshold: pictures.AlphaThreshold = None,
+    min_speck: pictures.MinSpeck = None,
+    keep_specks: pictures.KeepSpecks = False,
+    show_mask: pictures.ShowMask = False,
 ) -> int:
     """Check the options, then write one sequence after the other; return the exit code."""
     from autopoly_env.silhouette import load_silhouette
@@ -84,6 +94,9 @@ def export(
     if out is not None and out.resolve() in {source.resolve() for source in sources}:
         raise ConfigError(f"{out}: is a sequence; give another --out")
     know(operators)
+    picture = pictures.read_options(object_, background, threshold, alpha_threshold, min_speck, keep_specks)
+    if target is None and (show_mask or pictures.as_dict(picture)):
+        raise ConfigError("--object, --show-mask and the like are about the picture of --target; give one")
     made = _choose(to, out, len(sources))
     if depth and not made.shows_depth:
         able = [name for name, other in formats().items() if other.shows_depth]
@@ -92,12 +105,14 @@ def export(
         able = [name for name, other in formats().items() if other.shows_target]
         raise ConfigError(f"--target {target}: {made.name} shows no target; use it with {', '.join(able)}")
     jobs = list(_name_outputs(sources, out, made.suffix))
-    silhouette = load_silhouette(target) if target else None
+    silhouette = load_silhouette(target, options=picture) if target else None
+    if silhouette is not None and show_mask:
+        print(pictures.save_mask(silhouette, jobs[0][1].with_name(f"{silhouette.name}-{pictures.MASK}")))
     n_failed = 0
     for source, goal in jobs:
         try:
             _write(made, Export(_load(source, step), silhouette, depth), goal)
-            print(goal)
+            print(tame(str(goal)))
         except ConfigError:
             raise
         except AutoPolyError as error:
@@ -114,7 +129,7 @@ def main(arguments: list[str] | None = None) -> int:
 def _choose(to: str | None, out: Path | None, n: int) -> Format:
     """The format of `n` sequences: by its name, or by the ending of --out. Raises ConfigError if they contradict."""
     named = None if to is None else find_format(to)
-    if out is None or not out.suffix or out.is_dir():
+    if out is None or not out.suffix or os.path.isdir(out):
         return named or find_format(DEFAULT)
     if n > 1:  # to go into a folder, which may have a dot in its name
         if out.suffix.lower() in {suffix for other in formats().values() for suffix in other.suffixes}:
@@ -139,7 +154,7 @@ def _write(made: Format, export: Export, goal: Path) -> None:
     except Exception as error:  # whatever it is, the other sequences can be written
         what = described(error, module)
         raise OutputError(f"{who}, failed: {what}; expected a file or an OutputError ({_CHECK})") from error
-    if not goal.exists():
+    if not os.path.exists(goal):
         raise OutputError(f"{who}, made no such file ({_CHECK})")
 
 
@@ -160,8 +175,8 @@ def _name_outputs(sources: list[Path], out: Path | None, suffix: str) -> Iterato
     taken = {source.resolve() for source in sources}
     for source in sources:
         if out is None:
-            goal = source.with_suffix(suffix)
-        elif len(sources) == 1 and out.suffix and not out.is_dir():
+            goal = source.with_suffix(suffix) if source.name else source / f"sequence{suffix}"
+        elif len(sources) == 1 and out.suffix and not os.path.isdir(out):
             goal = out
         else:
             name = source.resolve().parent.name if source.stem == "sequence" else source.stem

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from agents.commands import pictures
 from agents.commands.operators import FaceRuleOfSequence, OutsideOperators, know
 from agents.commands.running import INTERRUPTED, run_command
 from autopoly_env.errors import ConfigError, SequenceError
@@ -50,6 +51,13 @@ def retarget(
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out"),
     operators: OutsideOperators = None,
     faces: FaceRuleOfSequence = None,
+    object_: pictures.Object = "auto",
+    background: pictures.Background = None,
+    threshold: pictures.Threshold = None,
+    alpha_threshold: pictures.AlphaThreshold = None,
+    min_speck: pictures.MinSpeck = None,
+    keep_specks: pictures.KeepSpecks = False,
+    show_mask: pictures.ShowMask = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print a JSON record, no table.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar, no notes.")] = False,
 ) -> int:
@@ -64,10 +72,11 @@ def retarget(
     from autopoly_env.silhouette import load_silhouette
 
     budget = Budget(refits=refits)
+    picture = pictures.read_options(object_, background, threshold, alpha_threshold, min_speck, keep_specks)
     know(operators)
     sequence = _under(source, ConstructionSequence.load(source), faces)
     [job] = name_jobs([image], out)
-    silhouette = load_silhouette(image, name=job.name)
+    silhouette = load_silhouette(image, name=job.name, options=picture)
     simulator = _simulator(source, sequence, silhouette)
     _check_not_overwritten(source, out / job.name)
     claim_folder(out)
@@ -75,10 +84,10 @@ def retarget(
         report.begin(job.name)
         try:
             with ctrl_c.searching():
-                done = work(simulator, sequence, budget, report.progress)
+                done = work(simulator, sequence, budget, ctrl_c.heeding(report.progress))
             told = replace(done.solution.sequence, settings={**done.solution.sequence.settings, **_notes_of(done)})
             solution = replace(done.solution, sequence=told)
-            files = write_results(out / job.name, solution, silhouette, ctrl_c.shielded)
+            files = write_results(out / job.name, solution, silhouette, ctrl_c.shielded, with_mask=show_mask)
         except KeyboardInterrupt:
             return INTERRUPTED
         if as_json:

@@ -7,6 +7,8 @@ from autopoly_env.score import Score
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.simulator import State
 
+OVER_BUDGET = "over budget"
+
 
 @dataclass(frozen=True)
 class Stats:
@@ -14,7 +16,9 @@ class Stats:
 
     n_refits: int
     seconds: float
-    stopped_by: str  # "finished", "interrupted", or what was spent: "refits", "seconds" or "simulations"
+    # "finished", "interrupted", or what was spent: "refits", "seconds", "simulations" or "states"; OVER_BUDGET where an
+    # agent did more refits than it was given, and did not count them
+    stopped_by: str
 
 
 @dataclass(frozen=True)

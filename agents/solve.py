@@ -1,17 +1,18 @@
 """The command `python -m agents.solve`: from silhouette images to meshes, construction sequences and pictures."""
 
-import errno
-import io
 import sys
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from agents.commands.running import FAILURE, complain, run_command
+from agents.commands import pictures
+from agents.commands.running import run_command
 from agents.commands.styles import DEFAULT_STYLE, describe_styles, style_named
 from agents.names import AGENT_NAMES
 from autopoly_env.errors import AutoPolyError
+
+MOST_SKIPPED = 3  # files that are named
 
 HELP = """Build a polygon mesh of every silhouette and tell how, action by action.
 
@@ -27,13 +28,19 @@ Examples:
   python -m agents.solve mug.png --importance face.png
   python -m agents.solve mug.png --agent beam --start mug.obj --lock 0,3
   python -m agents.solve vase.png --agent beam --symmetry auto
+  python -m agents.solve gear.png --keep holes
+  python -m agents.solve badge.png --object dark --show-mask
 
 \b
 For every image, OUT/<name of the file without its ending>/ gets
   sequence.json  the actions, to be replayed    mesh.obj  the mesh, y up
   steps.png      every step over the target     mesh.svg  the mesh, to edit
   player.html    the construction, to be watched and done by hand in Blender
-and OUT/overview.png shows all meshes, if there are several images.
+and OUT/overview.png shows all meshes beside their pictures, if there are several images.
+
+\b
+What in a picture is the object (docs/pictures-in.md) the notes tell; --object, --background, --threshold,
+--alpha-threshold, --min-speck and --keep-specks say otherwise, and --show-mask writes mask.png.
 
 \b
 Guidance (docs/guidance.md): --importance is for every agent; --start, --lock
@@ -125,6 +132,17 @@ def solve(
         str | None,
         typer.Option(metavar="[auto|X]", help="Left and right alike, about the best axis or x = X (0 to 1)."),
     ] = None,
+    keep: Annotated[
+        str | None,
+        typer.Option(metavar="[holes|parts|all]", help="What of the picture is to be in the mesh, whatever it costs."),
+    ] = None,
+    object_: pictures.Object = "auto",
+    background: pictures.Background = None,
+    threshold: pictures.Threshold = None,
+    alpha_threshold: pictures.AlphaThreshold = None,
+    min_speck: pictures.MinSpeck = None,
+    keep_specks: pictures.KeepSpecks = False,
+    show_mask: pictures.ShowMask = False,
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out"),
     as_json: Annotated[
         bool, typer.Option("--json", help="Print a JSON record a line as each image is done, no table.")
@@ -147,31 +165,41 @@ def solve(
     shown = read_columns(columns, FORMATS, COLUMNS)
     weights = ScoreWeights(w_sm, w_sc, w_si, w_locality)
     budget = Budget(refits, seconds, simulations)
-    wishes = read_wishes(importance, start, lock, symmetry)
+    wishes = read_wishes(importance, start, lock, symmetry, keep)
     options = _parse_options(option or [])
     chosen = style_named(style).with_choices(agent, operators, faces)
+    picture = pictures.read_options(object_, background, threshold, alpha_threshold, min_speck, keep_specks)
     settings = Settings(
-        chosen.agent, options, seed, chosen.operators, resolution, max_steps, weights, budget, wishes, chosen.faces
+        chosen.agent,
+        options,
+        seed,
+        chosen.operators,
+        resolution,
+        max_steps,
+        weights,
+        budget,
+        wishes,
+        chosen.faces,
+        picture,
+        show_mask,
     )
     settings.check()
-    found, problems = _find(images)
+    found, problems, skipped = _find(images)
     jobs = name_jobs(found, out)
     claim_folder(out)
     with Report(len(jobs) + len(problems), as_json=as_json, quiet=quiet, columns=shown) as report:
         for image, problem in problems:
             report.failed(image, problem)
+        if skipped and not quiet:
+            names = ", ".join(path.name for path in skipped[:MOST_SKIPPED])
+            more = ", …" if len(skipped) > MOST_SKIPPED else ""
+            report.say(f"note: {len(skipped)} files are no pictures and were skipped: {names}{more}")
         return solve_all(jobs, settings, out, report)
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; whatever is wrong is told in one line on stderr. Returns the exit code."""
-    try:
-        return run_command(app, arguments, "python -m agents.solve", stopped="")
-    except OSError as error:
-        if error.errno == errno.EPIPE:
-            raise
-        sys.stdout = io.StringIO()  # so that leaving does not fail on it again
-        return complain(f"cannot print the results ({error.strerror}); give them another place to go", FAILURE)
+    return run_command(app, arguments, "python -m agents.solve")
 
 
 def _parse_options(given: list[str]) -> dict[str, Any]:
@@ -184,18 +212,19 @@ def _parse_options(given: list[str]) -> dict[str, Any]:
     return options
 
 
-def _find(given: list[str]) -> tuple[list[Path], list[tuple[str, str]]]:
-    """The images, each once, and (what was given, what is wrong with it) where there are none."""
+def _find(given: list[str]) -> tuple[list[Path], list[tuple[str, str]], list[Path]]:
+    """The images, each once, (what was given, what is wrong with it) where there are none, and what else lies there."""
     from autopoly_env.silhouette import find_images
 
     found: dict[Path, None] = {}
-    problems = []
+    problems: list[tuple[str, str]] = []
+    skipped: list[Path] = []
     for path in given:
         try:
-            found.update(dict.fromkeys(find_images([path])))
+            found.update(dict.fromkeys(find_images([path], skipped)))
         except AutoPolyError as error:
             problems.append((path, str(error)))
-    return list(found), problems
+    return list(found), problems, skipped
 
 
 if __name__ == "__main__":

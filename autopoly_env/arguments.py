@@ -1,43 +1,52 @@
 """Checks of values that people type or files hold, with errors that say what is allowed."""
 
+import math
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, SupportsFloat, TypeVar
 
 import numpy as np
 
 from autopoly_env.errors import ConfigError
+from autopoly_env.shown import short
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
 
 _Value = TypeVar("_Value")
 
+LARGEST = 2**63 - 1  # whole number that kernels and random numbers take
+
+
+def is_count(text: str) -> bool:
+    """Whether a text is a whole number from 0, of at most 18 digits."""
+    return text.isascii() and text.isdecimal() and len(text) <= 18
+
 
 def one_of(name: str, value: _Value, allowed: tuple[_Value, ...]) -> _Value:
     """The value, if it is allowed. Raises ConfigError otherwise."""
     if value not in allowed:
-        raise ConfigError(f"{name}={value!r}: expected one of {', '.join(map(repr, allowed))}")
+        raise ConfigError(f"{name}={short(value)}: expected one of {', '.join(map(repr, allowed))}")
     return value
 
 
-def whole(name: str, value: Any, at_least: int = 0) -> int:
-    """The value, a whole number of at least so much. Raises ConfigError otherwise."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < at_least:
-        raise ConfigError(f"{name}={value!r}: expected a whole number of at least {at_least}")
+def whole(name: str, value: Any, at_least: int = 0, at_most: int = LARGEST) -> int:
+    """The value, a whole number of at least and at most so much. Raises ConfigError otherwise."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not at_least <= value <= at_most:
+        bounds = f"of at least {at_least}" + (f", at most {at_most}" if at_most < LARGEST else "")
+        raise ConfigError(f"{name}={short(value)}: expected a whole number {bounds}")
     return int(value)
 
 
 def number(name: str, value: Any) -> float:
     """The value, a finite number. Raises ConfigError otherwise."""
-    if isinstance(value, bool) or not isinstance(value, SupportsFloat) or not np.isfinite(float(value)):
-        raise ConfigError(f"{name}={value!r}: expected a number")
-    return float(value)
-
-
-def shortened(value: object) -> str:
-    """A value for a message, at most 40 characters long."""
-    text = repr(value)
-    return text if len(text) <= 40 else text[:37] + "..."
+    found = float("nan")
+    if not isinstance(value, bool) and isinstance(value, SupportsFloat):
+        with suppress(OverflowError, TypeError, ValueError):
+            found = float(value)
+    if not math.isfinite(found):
+        raise ConfigError(f"{name}={short(value)}: expected a number")
+    return found
 
 
 @dataclass(frozen=True)

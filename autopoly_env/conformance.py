@@ -10,17 +10,19 @@ import pickle
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from functools import wraps
 from pathlib import Path
-from typing import Any
+from typing import Any, ParamSpec
 
 import numpy as np
 
 from autopoly_env.errors import AutoPolyError, ConfigError, ConformanceError, IllegalActionError, OutputError
 from autopoly_env.export.formats import Export, Format
 from autopoly_env.export.player import describe_step
-from autopoly_env.mesh import PolyMesh, broken_faces, images_of, is_valid
+from autopoly_env.mesh import PolyMesh, broken_faces, defects_of, images_of, is_valid
 from autopoly_env.operators import OPERATORS, STOP, Action, Operator, Start
 from autopoly_env.operators.operator import Mirroring
+from autopoly_env.outside import described
 from autopoly_env.raster import coverage
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence.ids import decoded
@@ -28,11 +30,32 @@ from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator, State
 from autopoly_env.targets import TargetSource
 
+_Checked = ParamSpec("_Checked")
+
+
+def _promising(check: Callable[_Checked, None]) -> Callable[_Checked, None]:
+    """The check, which raises ConformanceError also where the part that is checked raises something unexpected."""
+
+    @wraps(check)
+    def checked(*arguments: _Checked.args, **settings: _Checked.kwargs) -> None:
+        try:
+            check(*arguments, **settings)
+        except AutoPolyError as error:
+            if isinstance(error, ConformanceError):
+                raise
+            raise ConformanceError(f"it raises {type(error).__name__}: {error}") from error
+        except Exception as error:  # whatever somebody else's code may do
+            raise ConformanceError(f"it raises {described(error)}") from error
+
+    return checked
+
+
 _AXIS = 0.5  # of the symmetric ones among the sample meshes
 _LOOK = 32  # pixels a side at which a rendering is looked at
 _NO_SCORE = {"iou": 0.0, "complexity": 0, "self_intersections": 0, "total": 0.0}
 
 
+@_promising
 def check_operator(operator: Operator, meshes: Iterable[PolyMesh] | None = None) -> None:
     """Check an operator on every element of some meshes (by default of a few with concave faces and holes).
 
@@ -55,13 +78,14 @@ def check_operator(operator: Operator, meshes: Iterable[PolyMesh] | None = None)
                 _check_edit(operator, mesh, element, legal, where)
 
 
+@_promising
 def check_simulator(simulator: Simulator, n_steps: int = 30, seed: int = 0) -> None:
     """Check a simulator by playing `n_steps` random actions.
 
-    Rules: STOP is legal until the end, nothing after it; every action it calls legal works, another raises
-    IllegalActionError; the same state and action give the same state, alone and in `transition_all`; a transition
-    leaves the state it starts from as it was; scores are those of the meshes; states pickle; `max_steps` is kept, and
-    so is the rule of faces.
+    Rules: STOP is legal until the end, nothing after it; every action it calls legal works or has no room, another
+    raises IllegalActionError; no transition brings a crossing, or a flipped or empty face; the same state and action
+    give the same state, alone and in `transition_all`; a transition leaves the state it starts from as it was, and its
+    refits are counted; scores are those of the meshes; states pickle; `max_steps` is kept, and so is the rule of faces.
     """
     rng = np.random.default_rng(seed)
     state = simulator.initial()
@@ -84,6 +108,7 @@ def check_simulator(simulator: Simulator, n_steps: int = 30, seed: int = 0) -> N
     )
 
 
+@_promising
 def check_target_source(source: TargetSource, n: int = 10) -> None:
     """Check a source of targets with the seeds 0 to `n` - 1.
 
@@ -104,6 +129,7 @@ def check_target_source(source: TargetSource, n: int = 10) -> None:
     _require(_raises(ConfigError, lambda: source.sample(-1)), "seed -1 is not refused with a ConfigError")
 
 
+@_promising
 def check_format(made: Format) -> None:
     """Check a format that sequences are exported to.
 
@@ -149,12 +175,13 @@ def _written(made: Format, export: Export, path: Path, where: str) -> None:
         raise ConformanceError(f"{where}: {type(error).__name__}: {error}") from error
 
 
+@_promising
 def check_env(env: Any, n_steps: int = 60, seed: int = 0) -> None:
     """Check of an AutoPoly environment, wrapped or not, what Gymnasium's own `check_env` does not.
 
-    Rules: STOP is always legal; an action that the mask allows is never invalid, one that it forbids always is and
-    leaves the shape alone; infos have the same keys and types at every step; restoring a state and playing on gives
-    the same trace, bit for bit, and so does a copy of the state that was pickled.
+    Rules: STOP is always legal; an action that the mask forbids is invalid and leaves the shape alone; so does one that
+    it allows and that has no room, which it forbids from then on; infos have the same keys and types at every step;
+    restoring a state and playing on gives the same trace, bit for bit, and so does a copy of the state from a pickle.
     """
     rng = np.random.default_rng(seed)
     _, info = env.reset(seed=seed)
@@ -289,8 +316,15 @@ def _check_mirror(operator: Operator, mesh: PolyMesh, element: int, where: str) 
 
 def _checked_transition(simulator: Simulator, state: State, action: Any, where: str) -> State:
     where = f"{where}, {action.operator} {action.element}"
-    before = pickle.dumps(state)
-    after = simulator.transition(state, action)
+    before, n_refits = pickle.dumps(state), simulator.n_refits
+    try:
+        after = simulator.transition(state, action)
+    except IllegalActionError:
+        _require(not simulator.transition_all(state, [action]), f"{where} has no room in transition alone")
+        return state
+    _require(simulator.n_refits - n_refits == after.n_refits, f"{where}: the simulator does not count its refits")
+    worse = any(now > then for now, then in zip(defects_of(after.mesh), defects_of(state.mesh), strict=True))
+    _require(not worse, f"{where}: edges cross, or a face is flipped or empty, that was not before")
     _require(_same_state(after, simulator.transition(state, action)), f"{where} does not give the same state twice")
     (batched,) = simulator.transition_all(state, [action]) or (None,)
     _require(batched is not None and _same_state(after, batched), f"{where} gives another state in transition_all")
@@ -318,8 +352,11 @@ def _checked_step(env: Any, action: int, before: dict[str, Any], where: str) -> 
     types = [{name: type(value) for name, value in one.items()} for one in (before, info)]
     _require(types[0] == types[1], f"{where}: the infos have other keys or types than before")
     illegal = mask[action] == 0
-    _require(info["invalid_action"] == illegal, f"{where}: invalid_action is wrong about action {action}")
-    _require(not illegal or info["r_all"] == before["r_all"], f"{where}: an illegal action changed the shape")
+    invalid = info["invalid_action"]
+    is_same = info["r_all"] == before["r_all"]
+    has_no_room = is_same and info["action_mask"][action] == 0  # as is known now
+    _require(invalid == illegal or (invalid and has_no_room), f"{where}: invalid_action is wrong about action {action}")
+    _require(is_same or not illegal, f"{where}: an illegal action changed the shape")
     return tuple(outcome)
 
 

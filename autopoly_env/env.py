@@ -25,6 +25,7 @@ REWARD_MODES = ("score", "improvement")
 RENDER_MODES = ("rgb_array", "ansi")
 RESET_OPTIONS = ("target", "mesh", "state")
 _ANY_SHAPE = Silhouette(np.ones((8, 8), np.bool_))  # stands for the target while the rules are checked
+MOST_VERTICES = 10_000  # that arrays are padded to
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +38,8 @@ class EnvState:
     previous: PolyMesh | None  # the mesh one step earlier; None at the start
     best_r_all: float  # since the start
     action: str  # of the last step, in words
-    illegal: bool  # whether that was illegal
+    illegal: bool  # whether that was illegal, or had no room
+    no_room: tuple[int, ...] = ()  # actions that the mesh as it is has proved to have no room for
 
 
 class AutoPolyEnv(gymnasium.Env[Observation, Any]):
@@ -68,7 +70,8 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
 
     `Discrete`: 0 is STOP, then each operator has one index for every element that a mesh of N vertices may have.
     `info["action_mask"]` (int8) and `action_masks()` (bool) say which are legal; an operator that would leave the
-    padding is not. An illegal action is a step in which nothing is done (`info["invalid_action"]`).
+    padding is not. An illegal action is a step in which nothing is done (`info["invalid_action"]`). So is, rarely, a
+    legal one that has no room, which is known once it is tried; the mask forbids it from then on.
 
     ## Reward
 
@@ -87,7 +90,7 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
     ## Arguments
 
     - `targets`: "construction", "objects", a folder of images, or a `TargetSource`; `split`: "train" or "test".
-    - `operators`: a preset ("paper", "full") or names with commas between them.
+    - `operators`: a preset ("paper", "full", "modeller") or names with commas between them.
     - `resolution`: pixels a side at which meshes are fitted and scored; `obs_resolution`: of the observed pictures.
     - `faces`: the rule of faces that every mesh keeps: "any", "convex", "quads" (convex, 3 or 4 corners).
     - `max_steps`, `max_vertices`, `match_threshold`: see above.
@@ -140,19 +143,19 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
             "operators": operators,
             "resolution": whole("resolution", resolution),
             "weights": ScoreWeights(number("w_sm", w_sm), number("w_sc", w_sc), number("w_si", w_si)),
-            "max_steps": whole("max_steps", max_steps, at_least=1),
+            "max_steps": whole("max_steps", max_steps, 1, 2**31 - 1),
             "match_threshold": number("match_threshold", match_threshold),
             "faces": one_of("faces", faces, FACE_RULES),
         }
         example = self._simulator_of(_ANY_SHAPE)
-        self.codec = ActionCodec(example.operators, whole("max_vertices", max_vertices, at_least=4))
-        self._observer = Observer(max_vertices, whole("obs_resolution", obs_resolution, at_least=2), max_steps)
+        self.codec = ActionCodec(example.operators, whole("max_vertices", max_vertices, 4, MOST_VERTICES))
+        self._observer = Observer(max_vertices, whole("obs_resolution", obs_resolution, 2, 1024), max_steps)
         rules = {**example.settings(), "max_vertices": max_vertices}
         self._rules = tuple((name, value) for name, value in rules.items() if name != "target")
         self._improvement = one_of("reward_mode", reward_mode, REWARD_MODES) == "improvement"
         self._illegal_penalty = number("illegal_penalty", illegal_penalty)
         self.render_mode = one_of("render_mode", render_mode, (None, *RENDER_MODES))
-        self._render_size = whole("render_size", render_size, at_least=16)
+        self._render_size = whole("render_size", render_size, 16, 4096)
         self.action_space = gymnasium.spaces.Discrete(self.codec.n_actions)
         boxes: dict[str, gymnasium.Space[Any]] = {
             name: gymnasium.spaces.Box(field.low, field.high, field.shape, field.dtype)
@@ -196,7 +199,8 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
             raise EpisodeError(f"a step after the end of the episode ({before.done}): call reset() first")
         chosen = self.codec.decode(index)
         after = (yield from self._transition(before, chosen)) if self._legal_mask()[index] else None
-        self._advance(after or self._simulator.idle(before), describe(before.mesh, chosen), illegal=after is None)
+        no_room = (index,) if after is None and self._legal_mask()[index] else ()
+        self._advance(after or self._simulator.idle(before), describe(before.mesh, chosen), after is None, no_room)
         done = self.state.done
         return self._observation(), self._reward(before), done in ("stop", "matched"), done == "max_steps", self._info()
 
@@ -291,10 +295,10 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
         except IllegalActionError:
             return None
 
-    def _advance(self, state: State, action: str, illegal: bool) -> None:
+    def _advance(self, state: State, action: str, illegal: bool, no_room: tuple[int, ...]) -> None:
         now = self._current()
-        best = max(now.best_r_all, state.score.total)
-        self._episode = EnvState(self._rules, now.silhouette, state, now.state.mesh, best, action, illegal)
+        best, known = max(now.best_r_all, state.score.total), (*now.no_room, *no_room) if illegal else ()
+        self._episode = EnvState(self._rules, now.silhouette, state, now.state.mesh, best, action, illegal, known)
         self._mask = None
 
     def _reward(self, before: State) -> float:
@@ -307,6 +311,7 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
             self._mask = self.codec.legal_mask(self.state.mesh)
             if self._simulator.faces != "any":
                 self._mask &= self.codec.mask_of(self._simulator.legal_actions(self.state))
+            self._mask[list(self._current().no_room)] = False
         return self._mask
 
     def _observation(self) -> Observation:

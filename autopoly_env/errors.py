@@ -1,8 +1,16 @@
 """The errors AutoPoly raises on purpose. Each message says what was given, what was expected and what to do."""
 
+from autopoly_env.shown import told
+
 
 class AutoPolyError(Exception):
-    """Base of every error raised on purpose by this project."""
+    """Base of every error raised on purpose by this project.
+
+    As text it is one line of at most 400 letters, in which nothing that was given acts on a terminal.
+    """
+
+    def __str__(self) -> str:
+        return told(super().__str__())
 
 
 class SilhouetteError(AutoPolyError):

@@ -1,15 +1,18 @@
 """The reward of the paper: 100 IoU - w_sc (V + E + F) - w_si self-intersections."""
 
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from itertools import combinations
 
 import numpy as np
 import shapely
 
+from autopoly_env.arguments import number
 from autopoly_env.arrays import FloatArray, IntArray
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh, geometry_kernels
 from autopoly_env.raster import pixels_of, raster_kernels, workspace
+from autopoly_env.shown import short
 from autopoly_env.silhouette import Target
 
 
@@ -24,15 +27,17 @@ class ScoreWeights:
 
     def __post_init__(self) -> None:
         for name, value in asdict(self).items():
-            if not (np.isfinite(value) and value >= 0.0):
-                raise ConfigError(f"{name} = {value}: expected a finite weight of at least 0")
+            with suppress(ConfigError):
+                if number(name, value) >= 0.0:
+                    continue
+            raise ConfigError(f"{name} = {short(value)}: expected a finite weight of at least 0")
 
 
 @dataclass(frozen=True)
 class Score:
     """What a mesh is worth, and why."""
 
-    iou: float  # r_sm, 0 to 1, of the rendering binarised at half coverage
+    iou: float  # r_sm, 0 to 1, of the rendering binarised at half coverage; of small pictures' exact areas
     complexity: int  # r_sc = V + E + F
     self_intersections: int  # r_si
     total: float  # r_all
@@ -54,7 +59,8 @@ def score(mesh: PolyMesh, target: Target, weights: ScoreWeights) -> Score:
 def intersection_over_union(mesh: PolyMesh, target: Target) -> float:
     """IoU, 0 to 1, of the pixels that the mesh covers by half or more and the target's mask.
 
-    Where the target has weights: those of the intersection over those of the union, both summed exactly.
+    Where the target has weights: those of the intersection over those of the union, both summed exactly. Where it is
+    scored by area, a pixel counts by the share of it that the mesh covers, overlaps once: the exact IoU of the shapes.
     """
     edges = mesh.topology.boundary_half_edges
     work = workspace(target.resolution, len(edges))

@@ -12,10 +12,12 @@ from typing import Any
 import numpy as np
 import shapely
 
+from autopoly_env.arguments import number, whole
 from autopoly_env.arrays import BoolArray
 from autopoly_env.compute import Job, Routine, map_threads, run
+from autopoly_env.details import Details, hairlines
 from autopoly_env.errors import ConfigError, IllegalActionError, MeshError
-from autopoly_env.guidance import Guidance, ImportanceSource, importance_settings, weighted
+from autopoly_env.guidance import MOST_CORNERS, Guidance, ImportanceSource, importance_settings, weighted
 from autopoly_env.mesh import FaceRule, PolyMesh, broken_faces, check_faces, defects_of, face_rule
 from autopoly_env.operators import STOP, Action, Choice, Halfway, Operator, Start, describe, legal_actions, preset
 from autopoly_env.placement import Disagreement, Trial, tried
@@ -23,10 +25,13 @@ from autopoly_env.refit import FROM_AFAR, LOCAL, THOROUGH, RefitConfig, RefitTar
 from autopoly_env.score import Score, ScoreWeights, score
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence.lesson import share_moved
-from autopoly_env.silhouette import Silhouette
+from autopoly_env.silhouette import SMALL, Silhouette
 
 POLISH_RESOLUTION = 512  # of the finest refit; a score may be finer
+MANY_VERTICES = 150  # of a mesh, above which it is not searched or tuned vertex by vertex: that takes minutes
 _N_REFINED = 3  # refits at it, each towards more than the IoU of the one before
+_HAIRLINE_COST = 5.0  # points of r_all off in choosing, for each: as a crossing's
+_LOSS_COST = 50.0  # the same for a part or a hole that is to be kept and is not, times w_sc where that is above 1
 _BACKGROUND_STEPS = 16  # between weights 0 and 1, so that few targets are prepared
 
 
@@ -58,7 +63,8 @@ class Simulator:
 
     A user may guide the construction (docs/guidance.md): `importance`, an image that says where matching matters;
     `start`, the mesh to begin with, or a sequence to go on from; `locked`, ids of its vertices that are neither moved
-    nor removed; `symmetry` about a vertical axis, x in 0..1, or True for the axis that suits the silhouette best.
+    nor removed; `symmetry` about a vertical axis, x in 0..1, or True for the axis that suits the silhouette best;
+    `keep`, "holes", "parts" or "all": those of the picture that are to be in the mesh whatever they cost.
 
     Raises ConfigError for settings that are out of range or contradict each other.
     """
@@ -77,24 +83,28 @@ class Simulator:
         start: PolyMesh | ConstructionSequence | None = None,
         locked: Collection[int] = (),
         symmetry: bool | float | None = None,
+        keep: str | None = None,
     ) -> None:
+        resolution, max_steps = whole("resolution", resolution), whole("max_steps", max_steps)
         if not 8 <= resolution <= 1024:
             raise ConfigError(f"resolution {resolution}: expected 8 to 1024 pixels a side")
-        if max_steps < 0:
-            raise ConfigError(f"max_steps {max_steps}: expected at least 0")
-        if not 0.0 < match_threshold <= 1.0:
+        if not 0.0 < number("match_threshold", match_threshold) <= 1.0:
             raise ConfigError(f"match_threshold {match_threshold}: expected an IoU above 0, at most 1")
         self.faces = face_rule(faces)
         self.silhouette = silhouette if importance is None else weighted(silhouette, importance)
-        self.guidance = Guidance.of(self.silhouette, start, locked, symmetry)
+        self.guidance = Guidance.of(self.silhouette, start, locked, symmetry, keep)
         self._check_start()
         self.operators = tuple(operator.name for operator in preset(operators))
         self.resolution = resolution
         self.weights = weights or ScoreWeights()
         self.max_steps = max_steps
         self.match_threshold = match_threshold
+        own = self.silhouette.resolution
         self._target = self.silhouette.target(resolution)
-        self.finest = min(self.silhouette.resolution, POLISH_RESOLUTION)  # pixels a side at which meshes are finished
+        self._scored = self.silhouette.target(own) if self.silhouette.is_scored_by_area else self._target
+        self.finest = min(own, POLISH_RESOLUTION)  # pixels a side at which meshes are finished
+        self._refined_at = own * -(-SMALL // own) if self.silhouette.is_scored_by_area else self.finest  # whole blocks
+        self.n_refits = 0  # that its transitions and initial states have taken so far, whoever asked for them
         self._refit_targets: dict[tuple[int, float], RefitTarget] = {}
 
     def __getstate__(self) -> dict[str, Any]:
@@ -126,6 +136,7 @@ class Simulator:
             "match_threshold": self.match_threshold,
             **asdict(self.weights),
             **({} if self.faces == "any" else {"faces": self.faces}),
+            **({"scored_by": "area"} if self.silhouette.is_scored_by_area else {}),
             **importance_settings(self.silhouette),
             **self.guidance.settings(),
         }
@@ -143,10 +154,14 @@ class Simulator:
         """`initial` as a routine, whose jobs are the refits."""
         mesh = self.guidance.start if mesh is None else mesh
         if mesh is not None:
+            n_corners = sum(map(len, mesh.faces))
+            if n_corners > MOST_CORNERS:
+                raise ConfigError(f"the start mesh has {n_corners} corners: expected at most {MOST_CORNERS}")
             self.guidance.check_symmetric(mesh)
             self._check_faces(mesh, "the mesh")
             return self._ended(State(mesh, self.score(mesh), n_refits=0))
         fits = yield [self._refit_job(box, FROM_AFAR, 1.0) for box in self._bounding_boxes()]
+        self.n_refits += len(fits)
         best = max((fit.mesh for fit in fits), key=lambda fit: self.score(fit).total)
         return self._ended(State(best, self.score(best), n_refits=len(fits)))
 
@@ -174,11 +189,11 @@ class Simulator:
             yield PolyMesh.from_faces(corners, [(0, 1, 2, 3)])
 
     def defects_of(self, mesh: PolyMesh) -> tuple[int, int]:
-        """(crossings, faces that are flipped, empty or against the simulator's rule) of a mesh."""
+        """(crossings and hairlines, faces that are flipped, empty or against the simulator's rule) of a mesh."""
         return defects_of(mesh, self.faces)
 
     def is_sane(self, mesh: PolyMesh) -> bool:
-        """Whether no edges cross and no face is flipped, empty or against the simulator's rule."""
+        """Whether no edges cross or nearly meet, and no face is flipped, empty or against the simulator's rule."""
         return self.defects_of(mesh) == (0, 0)
 
     def _check_start(self) -> None:
@@ -186,8 +201,8 @@ class Simulator:
         if self.faces == "any":
             return
         earlier = self.guidance.earlier
-        for number, mesh in enumerate([] if earlier is None else earlier.meshes()):
-            self._check_faces(mesh, f"mesh {number} of the sequence to go on from")
+        for k, mesh in enumerate([] if earlier is None else earlier.replayed()):
+            self._check_faces(mesh, f"mesh {k} of the sequence to go on from")
         if self.guidance.start is not None:
             self._check_faces(self.guidance.start, "the start mesh")
 
@@ -200,9 +215,10 @@ class Simulator:
     def score(self, mesh: PolyMesh, before: PolyMesh | None = None) -> Score:
         """What a mesh is worth at the simulator's resolution; as the result of a step from `before`, if that is given.
 
+        Small pictures are scored on exact areas at any resolution.
         Then `docked` is taken off the total, by which agents choose.
         """
-        worth = score(mesh, self._target, self.weights)
+        worth = score(mesh, self._scored, self.weights)
         off = 0.0 if before is None else self.docked(before, mesh)
         return replace(worth, total=worth.total - off) if off else worth
 
@@ -215,8 +231,44 @@ class Simulator:
         """What a mesh is worth at the silhouette's own resolution: the paper's r_all, whatever led to it."""
         return score(mesh, self.silhouette.target(self.silhouette.resolution), self.weights)
 
+    def hairlines(self, mesh: PolyMesh) -> int:
+        """How many corridors and slits a mesh has that are too narrow to be seen and not in the picture."""
+        return hairlines(mesh, self.silhouette.target(self.finest))
+
+    def is_sound(self, mesh: PolyMesh) -> bool:
+        """Whether the mesh is sane, keeps the rule of faces and has no hairlines in view of the picture."""
+        return self.is_sane(mesh) and not self.hairlines(mesh)
+
+    def off(self, mesh: PolyMesh) -> float:
+        """Points of r_all that count against a mesh in choosing, though not in its score.
+
+        They are five for every hairline, as for a crossing, and fifty or more for every hole and part of the picture
+        that is to be kept (`keep`) and is not there.
+        """
+        return _HAIRLINE_COST * self.hairlines(mesh) + _LOSS_COST * max(1.0, self.weights.w_sc) * self._n_lost(mesh)
+
+    def _n_lost(self, mesh: PolyMesh) -> int:
+        if not self.guidance.keep:
+            return 0
+        details = Details.of(self.silhouette)
+        n_parts, n_holes = details.kept(mesh)
+        lost = {"parts": len(details.parts) - n_parts, "holes": len(details.holes) - n_holes}
+        return sum(lost[kind] for kind in self.guidance.keep)
+
+    def standing(self, state: State) -> float:
+        """What states are chosen by: their total, less what is `off` their mesh."""
+        return state.score.total - self.off(state.mesh)
+
+    def worth(self, mesh: PolyMesh) -> float:
+        """What finished meshes are chosen by: r_all at the silhouette's own resolution, less what is `off`."""
+        return self.final_score(mesh).total - self.off(mesh)
+
     def legal_actions(self, state: State) -> list[Action]:
-        """What may be done next; STOP first, and nothing once it is over."""
+        """What may be done next; STOP first, and nothing once it is over.
+
+        A few of these turn out to have no room once they are tried: `transition` refuses them, `transition_all` leaves
+        them out.
+        """
         if state.done:
             return []
         actions = [a for a in legal_actions(state.mesh, self.operators) if self.guidance.allows(state.mesh, a)]
@@ -226,7 +278,11 @@ class Simulator:
         return [STOP, *actions]
 
     def transition(self, state: State, action: Action) -> State:
-        """The state after one action and its refit. Raises IllegalActionError where the action is not legal."""
+        """The state after one action and its refit.
+
+        It has no crossing, and no flipped or empty face, that the state before has not. Raises IllegalActionError where
+        the action is not legal, and where even the refit leaves no room for it.
+        """
         return run(self.transition_routine(state, action))
 
     def transition_routine(self, state: State, action: Action) -> Routine[State]:
@@ -236,8 +292,14 @@ class Simulator:
         if action == STOP:
             return replace(state, done="stop", action=STOP, choice=None, n_refits=0, halfway=None)
         self._check_operator(action)
-        trial = self.trial_of(Disagreement(state.mesh, self.silhouette), action)
-        return (yield from self._refitted(state, trial))
+        disagreement = Disagreement(state.mesh, self.silhouette)
+        trial = self.trial_of(disagreement, action)
+        after = yield from self._refitted(state, trial)
+        self.n_refits += after.n_refits
+        if not _is_as_sane(after, disagreement):
+            what = describe(state.mesh, action)
+            raise IllegalActionError(f"{what} has no room: edges would cross, or a face be flipped or empty")
+        return after
 
     def idle(self, state: State) -> State:
         """The state one step later, nothing done: what a player that asks for an illegal action gets."""
@@ -246,8 +308,8 @@ class Simulator:
     def transition_all(self, state: State, actions: Sequence[Action] | None = None) -> list[State]:
         """`transition` of all (or the given) actions but STOP, on all cores, in their order.
 
-        Actions that turn out to have no room, such as a hole that fits nowhere, are left out. Raises
-        IllegalActionError for operators that are not the simulator's.
+        Actions that turn out to have no room, such as a hole that fits nowhere, are left out, though their refits
+        count. Raises IllegalActionError for operators that are not the simulator's.
         """
         if state.done:
             return []
@@ -257,7 +319,9 @@ class Simulator:
                 self._check_operator(action)
         disagreement = Disagreement(state.mesh, self.silhouette)
         trials = self._possible(disagreement, [action for action in chosen if action != STOP])
-        return map_threads(lambda trial: run(self._refitted(state, trial)), trials)
+        made = map_threads(lambda trial: run(self._refitted(state, trial)), trials)
+        self.n_refits += sum(after.n_refits for after in made)
+        return [after for after in made if _is_as_sane(after, disagreement)]
 
     def _check_operator(self, action: Action) -> None:
         if action.operator not in self.operators:
@@ -347,20 +411,28 @@ class Simulator:
     def refine(self, mesh: PolyMesh) -> PolyMesh:
         """The mesh refitted at the silhouette's own resolution (at most `POLISH_RESOLUTION`), as long as that helps."""
         bonds = self.guidance.bonds(mesh)
-        best, score = mesh, self.final_score(mesh)
+        best, worth = mesh, self.worth(mesh)
         for _ in range(_N_REFINED):
-            fitted = refit(best, self.refit_target(score.iou, self.finest), LOCAL, bonds, self.faces).mesh
-            fitted_score = self.final_score(fitted)
-            if not fitted_score.total > score.total:
+            target = self.refit_target(self.final_score(best).iou, self._refined_at)
+            fitted = refit(best, target, LOCAL, bonds, self.faces).mesh
+            fitted_worth = self.worth(fitted)
+            if not fitted_worth > worth:
                 break
-            best, score = fitted, fitted_score
+            best, worth = fitted, fitted_worth
         return best
 
     def polish(self, mesh: PolyMesh) -> PolyMesh:
-        """The mesh refined, then tuned at the same resolution: no worse than it was."""
+        """The mesh refined, then tuned at the same resolution, unless it has many vertices: no worse than it was."""
         refined = self.refine(mesh)
+        if len(mesh.vertices) > MANY_VERTICES:
+            return refined
         tuned = tune(refined, self.silhouette.target(self.finest), self.guidance.bonds(mesh), self.faces)
-        return max((refined, tuned), key=lambda candidate: self.final_score(candidate).total)
+        return max((refined, tuned), key=self.worth)
+
+
+def _is_as_sane(after: State, before: Disagreement) -> bool:
+    """Whether a transition has brought no crossing, and no flipped or empty face."""
+    return all(now <= then for now, then in zip(defects_of(after.mesh), before.defects, strict=True))
 
 
 def _ends_changed(before: PolyMesh, after: PolyMesh) -> set[int]:

@@ -28,6 +28,7 @@ GROUPS = {
     "growth": ("growth when the resolution doubles (times at both)", "benchmarks.rendering", "growth_rows", False),
     "gradient": ("gradient against central differences", "benchmarks.rendering", "gradient_rows", False),
     "refit": ("16-gon from a circle to the horse at 64", "benchmarks.refitting", "refit_rows", False),
+    "rule": ("refits under a rule of faces, at 128", "benchmarks.ruling", "rule_rows", True),
     "threads": ("simulator", "benchmarks.simulation", "thread_rows", True),
     "environment": ("environment, random legal actions at 64", "benchmarks.environment", "environment_rows", False),
     "import": ("import", "benchmarks.importing", "import_rows", False),

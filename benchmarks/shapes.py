@@ -8,7 +8,7 @@ from skimage.data import horse
 from autopoly_env.arrays import FloatArray
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.raster import coverage
-from autopoly_env.silhouette import Silhouette, Target, load_silhouette
+from autopoly_env.silhouette import ObjectOptions, Silhouette, Target, load_silhouette
 
 
 def regular(n: int, radius: float = 0.35, centre: tuple[float, float] = (0.5, 0.5), turn: float = 0.1) -> PolyMesh:
@@ -48,4 +48,4 @@ def target_of(mesh: PolyMesh, resolution: int) -> Target:
 @cache
 def horse_silhouette() -> Silhouette:
     """scikit-image's horse, the dark object on a light ground, padded to a square."""
-    return load_silhouette(~horse(), name="horse", min_component=0)
+    return load_silhouette(~horse(), name="horse", options=ObjectOptions(keep_specks=True))

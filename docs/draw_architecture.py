@@ -40,11 +40,14 @@ TABLES = {
         simulator: the rules: State, transition(state, action)
         guidance: a user's wishes | targets: what is to be built | export: a mesh becomes a file
         sequence: a construction: JSON that replays bit for bit
+        details: parts, holes, hairlines: what is lost
         placement: where new vertices begin | refit: a mesh meets the target | score: r_all | observation: what is seen
         operators: an action becomes a mesh | raster: exact coverage, exact derivatives | viewer: pictures of meshes
         mesh: PolyMesh: vertices, faces, their topology
-        silhouette: an image becomes a mask | compute: kernels, threads | files | arguments | outside
-        errors | arrays
+        silhouette: an image becomes a mask | compute: kernels, threads | files | outside
+        arguments: values that people type
+        errors
+        shown: text in one tame line | arrays
     """,
 }
 THE_WAY = {"silhouette", "operators", "export"}  # of an image, an action, a mesh

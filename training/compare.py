@@ -9,6 +9,7 @@ import typer
 from rich.console import Console
 
 from agents.commands.running import run_command
+from agents.commands.screen import say
 from autopoly_env.errors import ConfigError
 from autopoly_env.files import write_atomically
 from training.report.comparison import Row, read_runs, rows_of
@@ -70,13 +71,13 @@ def compare(
         write_atomically(path, text.encode("utf-8", "replace"))
     messages = Console(stderr=True)
     for note in comparison.notes:
-        messages.print(f"warning: {note}", markup=False, highlight=False, emoji=False, soft_wrap=True)
+        say(messages, f"warning: {note}")
     if as_json:
         for row in rows:
             print(json.dumps(record_of(row), allow_nan=False))
     elif not quiet:
         _print_table(rows)
-        Console().print(f"Open {out}", markup=False, highlight=False, emoji=False, soft_wrap=True)
+        say(Console(), f"Open {out}")
     return 0
 
 

@@ -1,15 +1,15 @@
 """The command `python -m training.evaluate`: measure agents on a suite of targets, resumably and in parallel."""
 
-import errno
-import io
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from agents.commands.running import FAILURE, INTERRUPTED, run_command
+from agents.commands.running import FAILURE, TOLD, run_command
+from agents.commands.screen import say
 from autopoly_env.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ def evaluate(
     if merge:
         folder = out or FOLDER / "merged"
         merge_runs([Path(part) for part in suite], folder, fresh=fresh)
-        return _finish(folder, baseline, as_json, shown)
+        return _finish(folder, baseline, as_json, shown, set())
     overrides = [*(override or []), *([] if faces is None else [f"faces={faces}"])]
     found, only = _read(suite[0], overrides, budget, agents, baseline)
     part = TargetShard.parse(shard)
@@ -110,8 +110,8 @@ def evaluate(
         run_suite(found, folder, machines, only=only, shard=part, resume=resume, fresh=fresh, quiet=quiet)
     except KeyboardInterrupt:
         print(f"stopped by Ctrl-C; what was done is in {folder}: go on with --resume", file=sys.stderr)
-        return INTERRUPTED
-    return _finish(folder, baseline, as_json, shown)
+        return TOLD
+    return _finish(folder, baseline, as_json, shown, only)
 
 
 def _check_flags(given: list[str], *, resume: bool, fresh: bool, merge: bool) -> None:
@@ -138,8 +138,8 @@ def _read(
     return suite, only
 
 
-def _finish(folder: Path, baseline: str | None, as_json: bool, columns: tuple[str, ...]) -> int:
-    """Write and show the table of a run; 1 if some of its tasks failed."""
+def _finish(folder: Path, baseline: str | None, as_json: bool, columns: tuple[str, ...], only: set[str]) -> int:
+    """Write the table of a run and show it, of the labels in `only`, if it has any; 1 if some of its tasks failed."""
     from rich.console import Console
 
     from training.evaluation.folder import suite_of
@@ -152,6 +152,8 @@ def _finish(folder: Path, baseline: str | None, as_json: bool, columns: tuple[st
     suite.check_baseline(baseline)
     table = table_of(suite, records, info.targets, suite.missing(), baseline)
     write_tables(folder, table)
+    if only:
+        table = replace(table, rows=tuple(row for row in table.rows if row.label in only))
     if as_json:
         for row in records_of(table):
             print(json.dumps(row, allow_nan=False))
@@ -161,7 +163,7 @@ def _finish(folder: Path, baseline: str | None, as_json: bool, columns: tuple[st
             console.width = PLAIN_WIDTH
         console.print(as_rich(heads_of(columns), lines_of(table, columns)))
         for line in (*table.notes, f"Open {folder / 'table.md'}"):
-            console.print(line, markup=False, highlight=False, emoji=False, soft_wrap=True)
+            say(console, line)
     n_failed = sum(record.outcome is None for record in records)
     if n_failed:
         print(f"{n_failed} of {len(records)} tasks failed: {folder / 'records.jsonl'} says why", file=sys.stderr)
@@ -170,14 +172,7 @@ def _finish(folder: Path, baseline: str | None, as_json: bool, columns: tuple[st
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; whatever is wrong is told in one line on stderr. Returns the exit code."""
-    try:
-        return run_command(app, arguments, "python -m training.evaluate", stopped="")
-    except OSError as error:
-        if error.errno == errno.EPIPE:
-            raise
-        sys.stdout = io.StringIO()  # so that leaving does not fail on it again
-        print(f"error: cannot print the table ({error.strerror}); it is in the folder of the run", file=sys.stderr)
-        return FAILURE
+    return run_command(app, arguments, "python -m training.evaluate")
 
 
 if __name__ == "__main__":

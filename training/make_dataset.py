@@ -5,10 +5,11 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.progress import Progress
 
 from agents.commands.progress import TASK, progress_bar
-from agents.commands.running import FAILURE, INTERRUPTED, run_command
+from agents.commands.running import FAILURE, TOLD, run_command
+from agents.commands.screen import say
+from autopoly_env.arguments import is_count
 from autopoly_env.errors import ConfigError
 
 HELP = """Make data sets of targets, check them, draw silhouettes of 3-D models.
@@ -117,7 +118,7 @@ def verify(
         for _, problem in check_dataset(folder):
             n_wrong += problem is not None
             if problem is not None:
-                _say(bar, f"error: {problem}")
+                say(bar.console, f"error: {problem}")
             bar.advance(TASK)
     n_right = len(manifest.names) - n_wrong
     print(f"{folder}: {n_right} of {len(manifest.names)} shards are as they should be ({manifest.n} targets)")
@@ -154,7 +155,7 @@ def silhouettes(
             picture = None if done.value is None else write_atomically(out / f"{done.task.name}.png", done.value).name
             records[done.task.name] = {"model": str(done.task.model), "picture": picture, "error": done.error}
             if done.error is not None:
-                _say(bar, f"error: {done.error}")
+                say(bar.console, f"error: {done.error}")
             bar.advance(TASK)
     write_index(out, [records[task.name] for task in tasks])
     n_failed = sum(record["error"] is not None for record in records.values())
@@ -178,13 +179,13 @@ def _build(
 
             def on_shard(_: ShardInfo | None, problem: str | None) -> None:
                 if problem is not None:
-                    _say(bar, f"error: {problem}")
+                    say(bar.console, f"error: {problem}")
                 bar.advance(TASK)
 
             manifest = build_dataset(out, settings, manifest, **machines, on_shard=on_shard)
     except KeyboardInterrupt:
         print(f"stopped by Ctrl-C; what was done is in {out}: go on with --resume", file=sys.stderr)
-        return INTERRUPTED
+        return TOLD
     n_there = sum(shard.n for shard in manifest.shards)
     print(f"{out}: {n_there} of {n} targets in {len(manifest.shards)} of {n_shards} shards")
     return 0 if n_there == n else FAILURE
@@ -193,18 +194,14 @@ def _build(
 def _range(text: str) -> tuple[int, int]:
     """ "3" or "1-5" as the least and the most."""
     least, _, most = text.partition("-")
-    if not least.isdecimal() or not (most or least).isdecimal():
+    if not is_count(least) or not is_count(most or least):
         raise ConfigError(f"--difficulty {text}: expected a number or a range, such as 3 or 1-5")
     return int(least), int(most or least)
 
 
-def _say(bar: Progress, text: str) -> None:
-    bar.console.print(" ".join(text.split()), markup=False, highlight=False, emoji=False, soft_wrap=True)
-
-
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; whatever is wrong is told in one line on stderr. Returns the exit code."""
-    return run_command(app, arguments, "python -m training.make_dataset", stopped="")
+    return run_command(app, arguments, "python -m training.make_dataset")
 
 
 if __name__ == "__main__":

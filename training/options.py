@@ -38,8 +38,11 @@ def build_config(kind: type[_Config], values: dict[str, Any], where: str) -> _Co
 
 
 def plain(config: Any) -> dict[str, Any]:
-    """A config as JSON knows it."""
-    values: dict[str, Any] = json.loads(json.dumps(asdict(config)))
+    """A config as JSON knows it. Raises ConfigError for what that cannot hold, such as a date or NaN."""
+    try:
+        values: dict[str, Any] = json.loads(json.dumps(asdict(config), allow_nan=False))
+    except (TypeError, ValueError, RecursionError) as error:
+        raise ConfigError(f"the settings cannot be written as JSON ({error}); give plain values") from None
     return values
 
 

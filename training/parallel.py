@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from autopoly_env.errors import AutoPolyError, ConfigError
+from autopoly_env.shown import told
 
 Task = TypeVar("Task")
 Value = TypeVar("Value")
@@ -100,10 +101,10 @@ def n_cores() -> int:
 def one_line(error: BaseException) -> str:
     """What an exception says, in one line; with its type and place if it is not one raised on purpose."""
     if isinstance(error, AutoPolyError):
-        return " ".join(str(error).split())
+        return str(error)
     frames = traceback.extract_tb(error.__traceback__)
     place = f" (in {Path(frames[-1].filename).name} line {frames[-1].lineno})" if frames else ""
-    return " ".join(f"{type(error).__name__}: {error}{place}".split())
+    return told(f"{type(error).__name__}: {error}{place}")
 
 
 def _ignore(_: object) -> None:

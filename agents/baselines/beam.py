@@ -46,29 +46,31 @@ class BeamAgent(Agent):
         return Decision(best.action, value=best.score.total)
 
     def _search(self, simulator: Simulator, track: Track, meter: Meter) -> Iterator[Track]:
-        best_total, kept, failures = track.state.score.total, [track], 0
+        best_total, kept, failures = simulator.standing(track.state), [track], 0
         while kept and failures < self._config.patience and not meter.spent():
             tracks = []
             for parent in kept:
                 if meter.spent():
                     break
+                n_before = simulator.n_refits
                 states = simulator.transition_all(parent.state)
-                children = [Track(state, parent) for state in states if simulator.is_sane(state.mesh)]
+                n_refits = simulator.n_refits - n_before
+                children = [Track(state, parent) for state in states if simulator.is_sound(state.mesh)]
                 yield from children
-                meter.add(states)
+                meter.add(states, n_refits)
                 tracks += children
             waived = simulator.weights.w_sc * self._config.stuck_discount if failures else 0.0
-            kept = self._select(tracks, waived)
+            kept = self._select(simulator, tracks, waived)
             failures += 1
-            top = max((track.state.score.total for track in kept), default=best_total)
+            top = max((simulator.standing(track.state) for track in kept), default=best_total)
             if top > best_total:
                 best_total, failures = top, 0
 
-    def _select(self, tracks: Iterable[Track], waived: float) -> list[Track]:
+    def _select(self, simulator: Simulator, tracks: Iterable[Track], waived: float) -> list[Track]:
         """The `width` best of them, best first, no shape twice; complexity counts `waived` less than in the score."""
 
         def rank(track: Track) -> float:
-            return -track.state.score.total - waived * track.state.score.complexity
+            return -simulator.standing(track.state) - waived * track.state.score.complexity
 
         chosen: dict[str, Track] = {}
         for track in sorted(tracks, key=rank):

@@ -44,12 +44,13 @@ class OracleAgent(Agent):
     def act(self, simulator: Simulator, state: State) -> Decision:
         """The first step towards the best shape; STOP where none is better."""
         start = Track(state)
-        best = max((best for _, best in self._bests(simulator, start, Meter.unlimited())), key=_total)
+        found = (best for _, best in self._bests(simulator, start, Meter.unlimited()))
+        best = max(found, key=lambda track: simulator.standing(track.state))
         if best is start:
             return Decision(STOP, value=state.score.total)
         action = best.states()[1].action
         assert action is not None
-        return Decision(action, value=_total(best))
+        return Decision(action, value=best.state.score.total)
 
     def solve(
         self,
@@ -68,7 +69,7 @@ class OracleAgent(Agent):
         except KeyboardInterrupt:
             meter.stopped_by = "interrupted"
         solutions = [finish(simulator, best.states(), meter) for best in bests.values()]
-        chosen = max(solutions, key=lambda solution: solution.score.total)
+        chosen = max(solutions, key=lambda solution: simulator.worth(solution.mesh))
         return replace(chosen, stats=meter.stats())
 
     def _bests(self, simulator: Simulator, start: Track, meter: Meter) -> Iterator[tuple[int, Track]]:
@@ -77,7 +78,7 @@ class OracleAgent(Agent):
             best = start
             yield number, best
             for track in beam._search(simulator, start, meter):
-                if _total(track) > _total(best):
+                if simulator.standing(track.state) > simulator.standing(best.state):
                     best = track
                     yield number, best
 
@@ -98,8 +99,8 @@ class _Shallow(BeamAgent):
         super().__init__(config)
         self._deepest = deepest
 
-    def _select(self, tracks: Iterable[Track], waived: float) -> list[Track]:
-        return super()._select([track for track in tracks if track.state.step < self._deepest], waived)
+    def _select(self, simulator: Simulator, tracks: Iterable[Track], waived: float) -> list[Track]:
+        return super()._select(simulator, [track for track in tracks if track.state.step < self._deepest], waived)
 
 
 class _Exhaustive(_Shallow):
@@ -113,19 +114,14 @@ class _Exhaustive(_Shallow):
         self._known: set[str] = set()
 
     def _search(self, simulator: Simulator, track: Track, meter: Meter) -> Iterator[Track]:
-        self._select([track], 0.0)
+        self._select(simulator, [track], 0.0)
         yield from super()._search(simulator, track, meter)
 
-    def _select(self, tracks: Iterable[Track], waived: float) -> list[Track]:
+    def _select(self, simulator: Simulator, tracks: Iterable[Track], waived: float) -> list[Track]:
         fresh = []
-        for track in sorted(tracks, key=_total, reverse=True):
+        for track in sorted(tracks, key=lambda track: simulator.standing(track.state), reverse=True):
             shape = canonical_hash(track.state.mesh, self._config.merge_grid)
             if track.state.step < self._deepest and shape not in self._known:
                 self._known.add(shape)
                 fresh.append(track)
         return fresh
-
-
-def _total(track: Track) -> float:
-    """r_all of a track's last state."""
-    return track.state.score.total

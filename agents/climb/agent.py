@@ -63,7 +63,7 @@ class ClimbAgent(WholeAgent):
             candidates.append(finish(simulator, tops.built(), meter))
         if not candidates:
             return finish(simulator, [simulator.initial()], meter)
-        best = max(candidates, key=lambda candidate: candidate.score.total)
+        best = max(candidates, key=lambda candidate: simulator.worth(candidate.mesh))
         return Solution(best.sequence, best.mesh, best.score, meter.stats())
 
     def _climb(self, tops: Tops, seed: Place, meter: Meter) -> None:
@@ -83,7 +83,7 @@ class ClimbAgent(WholeAgent):
 def climb(hill: Hill, place: Place, config: ClimbConfig, meter: Meter) -> Iterator[Place]:
     """Move to the best neighbour while one is better, looking harder before giving up; yield every place on the way."""
     for _ in range(config.n_rounds):
-        if meter.spent():
+        if meter.spent() or place.outline.is_fine:
             return
         places = fitted_neighbours(hill, place, config.n_blamed, meter)
         n_fits = len(places)

@@ -68,8 +68,9 @@ class DecimateAgent(WholeAgent):
             for outline in TraceAgent(TraceConfig((price,))).outlines(hill.simulator, meter):
                 fine.append(hill.place(outline))
                 yield fine[-1]
-            if fine:
-                yield from self._descent(hill, max(fine, key=total_of), meter)
+            coarse = [place for place in fine if not place.outline.is_fine]
+            if coarse:
+                yield from self._descent(hill, max(coarse, key=total_of), meter)
 
     def _descent(self, hill: Hill, place: Place, meter: Meter) -> Iterator[Place]:
         """The outline with ever less in it."""

@@ -1,6 +1,7 @@
 """The landscape that an outline climbs in: what each outline is worth, and how it is refitted before it is judged."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 from agents.trace.outline import Outline
@@ -35,8 +36,9 @@ class Hill:
         self._pixels = simulator.silhouette.target(simulator.finest)
 
     def place(self, outline: Outline) -> Place:
-        """The outline as it is."""
-        return Place(outline, outline.score(self._pixels, self.simulator.weights))
+        """The outline as it is; its total is less what is off it in choosing."""
+        score = outline.score(self._pixels, self.simulator.weights)
+        return Place(outline, replace(score, total=score.total - self.simulator.off(outline.loops)))
 
     def fit(self, outlines: Sequence[Outline], config: RefitConfig, iou: float) -> list[Place]:
         """Each outline refitted, on all cores, on the way to more than `iou`."""

@@ -28,8 +28,8 @@ _SAME = 1e-4  # totals that agree to this are those of one top
 def hop(hill: Hill, tops: list[Place], patience: int, rng: np.random.Generator, meter: Meter) -> Iterator[Place]:
     """What may be a better top, until `patience` hops in a row have found none; `tops` are those known already."""
     price = max(hill.simulator.weights.w_sc, _LEAST_PRICE)
-    arms = list(tops)
-    for seed in _variant_seeds(hill, meter):
+    arms = [top for top in tops if not top.outline.is_fine]
+    for seed in _variant_seeds(hill, meter) if arms else ():
         arms.append(seed)
         for place in chain([seed], climb(hill, seed, ClimbConfig(), meter)):
             arms[-1] = place
@@ -55,7 +55,7 @@ def _variant_seeds(hill: Hill, meter: Meter) -> list[Place]:
     seeds: dict[tuple[int, ...], Place] = {}
     for variant in variants(hill.simulator.silhouette):
         for outline in TraceAgent(TraceConfig()).sweep(hill.simulator, trace_rings(variant)):
-            if meter.spent():
+            if meter.spent() or outline.is_fine:
                 break
             [place] = hill.fit([outline], LOCAL, hill.place(outline).score.iou)
             meter.count(1, place.total)

@@ -1,8 +1,11 @@
 """Ctrl-C: the first one ends a search with its best so far, the second ends everything."""
 
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TypeVar
+
+_Said = TypeVar("_Said")
 
 
 class CtrlC:
@@ -34,6 +37,20 @@ class CtrlC:
             yield
         finally:
             self._searching = False
+
+    def heeding(self, report: Callable[[_Said], None]) -> Callable[[_Said], None]:
+        """`report`, which raises KeyboardInterrupt once more where Ctrl-C was pressed and the first one got lost.
+
+        That happens to exceptions that come up in callbacks from compiled code, such as while kernels are compiled.
+        """
+        n_before = self.n_pressed
+
+        def reported(said: _Said) -> None:
+            report(said)
+            if self.n_pressed > n_before:
+                raise KeyboardInterrupt
+
+        return reported
 
     @contextmanager
     def shielded(self) -> Iterator[None]:

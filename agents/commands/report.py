@@ -11,9 +11,12 @@ from rich.text import Text
 
 from agents import budget
 from agents.commands.columns import LESSON
+from agents.commands.losses import record_of_losses
 from agents.commands.progress import TASK, progress_bar
 from agents.commands.results import Result
+from agents.commands.screen import say
 from autopoly_env.sequence import Lesson
+from autopoly_env.shown import tame, told
 
 FORMATS = {  # of the numbers that a table can show, each and as a mean
     "r_sm": (".4f", ".4f"),
@@ -38,6 +41,7 @@ FORMATS = {  # of the numbers that a table can show, each and as a mean
 COLUMNS = ("r_sm", "r_sc", "r_si", "r_all", "actions", "valid", "blocking_in", "moved", "refits", "seconds")
 WARNING = "warning:"
 MOST_NOTES = 8  # lines of notes below a table
+LOST = " the mesh "  # in notes on what a mesh has lost
 MOST_NAMES = 4  # names of images in such a line
 PLAIN_WIDTH = 120  # of a table that goes to a file
 
@@ -72,8 +76,8 @@ class Report:
 
     def begin(self, name: str) -> None:
         """An image is begun."""
-        self._name = name
-        self._bar.update(TASK, description=name)
+        self._name = tame(name)
+        self._bar.update(TASK, description=self._name)
 
     def progress(self, progress: budget.Progress) -> None:
         """An agent has come this far with it."""
@@ -98,15 +102,15 @@ class Report:
     def failed(self, what: str, problem: str) -> None:
         """Something, most often an image, has failed."""
         self.n_failed += 1
-        problem = " ".join(problem.split())
+        problem = told(problem)
         self._bar.advance(TASK)
         if self._as_json:
             _print_record({"image": what, "error": problem})
-        self.say(f"error: {problem}" if what in problem else f"error: {what}: {problem}")
+        self.say(told(f"error: {problem}" if what in problem else f"error: {what}: {problem}"))
 
     def say(self, text: str) -> None:
         """A line on stderr, above the progress bar."""
-        _print_line(self._messages, text)
+        say(self._messages, text)
 
     def finish(self, overview: Path | None) -> None:
         """The work is done: show the table and what else there is to know, last the picture to open."""
@@ -121,11 +125,7 @@ class Report:
         if not self._as_json:
             self._output.print(_table(self._rows, self._columns))
         for line in lines:
-            _print_line(self._messages if self._as_json else self._output, line)
-
-
-def _print_line(console: Console, text: str) -> None:
-    console.print(text, markup=False, highlight=False, emoji=False, soft_wrap=True)
+            say(self._messages if self._as_json else self._output, line)
 
 
 def _print_record(record: dict[str, Any]) -> None:
@@ -160,16 +160,16 @@ def _table(rows: dict[str, dict[str, float]], columns: tuple[str, ...]) -> Table
         mean = sum(numbers[name] for numbers in rows.values()) / len(rows)
         table.add_column(name, footer=format(mean, FORMATS[name][1]), justify="right", no_wrap=True)
     for image, numbers in rows.items():
-        table.add_row(Text(image), *(format(numbers[name], FORMATS[name][0]) for name in columns))
+        table.add_row(Text(tame(image)), *(format(numbers[name], FORMATS[name][0]) for name in columns))
     return table
 
 
 def _note_lines(notes: dict[str, list[str]], n_images: int) -> list[str]:
-    """A line for every note that images share, those of most images first."""
+    """A line for every note that images share: what is lost first, then those of most images."""
     if n_images == 1:
         return [f"notes: {'; '.join(notes)}"] if notes else []
     lines = []
-    for note, names in sorted(notes.items(), key=lambda item: -len(item[1])):
+    for note, names in sorted(notes.items(), key=lambda item: (LOST not in item[0], -len(item[1]))):
         first, n_more = ", ".join(names[:MOST_NAMES]), len(names) - MOST_NAMES
         whose = f"all {n_images} images" if len(names) == n_images else first
         lines.append(f"note: {note}: {whose}" + (f" and {n_more} more" if whose == first and n_more > 0 else ""))
@@ -189,6 +189,7 @@ def record_of(result: Result) -> dict[str, Any]:
         "seed": settings["seed"],
         **_numbers_of(result),
         "stopped_by": result.solution.stats.stopped_by,
+        **({} if result.losses is None else {"kept": record_of_losses(result.losses)}),
         "notes": list(result.notes),
         "files": {name: str(path) for name, path in result.files.items()},
     }

@@ -4,25 +4,34 @@ import math
 import os
 import shutil
 import tempfile
+import time
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
+from PIL import Image, ImageOps
 
+from agents.commands.pictures import MASK, save_mask
 from agents.solution import Solution
 from autopoly_env import viewer
+from autopoly_env.arguments import is_count
 from autopoly_env.arrays import ByteArray
-from autopoly_env.errors import OutputError
+from autopoly_env.details import Losses
+from autopoly_env.errors import AutoPolyError, OutputError
 from autopoly_env.export import contact_sheet, save_html, save_png, to_obj, to_svg
-from autopoly_env.silhouette import Silhouette
+from autopoly_env.shown import told
+from autopoly_env.silhouette import Silhouette, thumbnail
 
 RESULTS = ("sequence.json", "mesh.obj", "mesh.svg", "steps.png", "player.html")
 OVERVIEW = "overview.png"
+_STAGING = ".solve-"  # how folders begin in which results are completed; the number of the process follows
+_PATIENCE = 5.0  # seconds that a folder is left alone, lest one of another machine is taken
 PAGE_SIZE = 3850  # pixels that an overview may have each way
+PICTURE_SHARE = 0.25  # of a mesh's width: how wide its picture is beside it
 CELL_SIZE = 256  # pixels of a mesh in it, if that fits
+_MOST_CAPTION = 60  # letters of a name in it
 
 
 @dataclass(frozen=True)
@@ -34,60 +43,109 @@ class Result:
     solution: Solution
     notes: tuple[str, ...]
     files: dict[str, Path]  # by their names, as in RESULTS
+    losses: Losses | None = None  # where they were looked at
 
 
 def claim_folder(folder: Path) -> None:
-    """Make the folder for the results, and see that it can be written. Raises OutputError."""
+    """Make the folder for the results, and see that it can be written; what a killed run has left in it goes.
+
+    Raises OutputError.
+    """
     try:
         folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
+        _sweep(folder)
     except OSError as error:
         reason = error.strerror or error
         raise OutputError(f"cannot write to the folder {folder} ({reason}); give another one with --out") from None
 
 
 def write_results(
-    folder: Path, solution: Solution, silhouette: Silhouette, shielded: Callable[[], AbstractContextManager[None]]
+    folder: Path,
+    solution: Solution,
+    silhouette: Silhouette,
+    shielded: Callable[[], AbstractContextManager[None]],
+    *,
+    with_mask: bool = False,
 ) -> dict[str, Path]:
     """Write all files of an image or none: they are completed beside the folder, and moved there in one go.
 
     The moves happen within `shielded()`. Raises OutputError if that does not work.
     """
+    results = (*RESULTS, MASK) if with_mask else RESULTS
     try:
-        staging = Path(tempfile.mkdtemp(prefix=".solve-", suffix=".tmp", dir=folder.parent))
+        in_the_way = next((folder / name for name in results if (folder / name).is_dir()), None)
+        if in_the_way is not None:
+            raise OutputError(f"cannot write {in_the_way} (a folder is in its place); move that away")
+        staging = Path(tempfile.mkdtemp(prefix=f"{_STAGING}{os.getpid()}-", suffix=".tmp", dir=folder.parent))
         try:
             solution.sequence.save(staging / "sequence.json")
             (staging / "mesh.obj").write_text(to_obj(solution.mesh), encoding="utf-8")
             (staging / "mesh.svg").write_text(to_svg(solution.mesh, target=silhouette), encoding="utf-8")
             save_png(contact_sheet(solution.sequence, silhouette), staging / "steps.png")
             save_html(solution.sequence, staging / "player.html", silhouette)
+            if with_mask:
+                save_mask(silhouette, staging / MASK)
             with shielded():
                 folder.mkdir(exist_ok=True)
-                for name in RESULTS:
+                for name in results:
                     os.replace(staging / name, folder / name)
         finally:
             shutil.rmtree(staging, ignore_errors=True)
     except OSError as error:
         raise OutputError(f"cannot write the results to {folder} ({error.strerror or error}); make room") from None
-    return {name: folder / name for name in RESULTS}
+    return {name: folder / name for name in results}
+
+
+def _sweep(folder: Path) -> None:
+    """Remove the staging folders of runs on this machine that are not there any more."""
+    for left in folder.glob(f"{_STAGING}*.tmp"):
+        owner = left.name.removeprefix(_STAGING).partition("-")[0]
+        if not (is_count(owner) and _is_running(int(owner))) and time.time() - left.stat().st_mtime > _PATIENCE:
+            shutil.rmtree(left, ignore_errors=True)
+
+
+def _is_running(process: int) -> bool:
+    if os.name == "nt":  # where signal 0 is no question
+        return True
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except OSError:  # it is somebody else's
+        return True
+    return True
 
 
 class Overview:
-    """All meshes over their targets on one page, in the order in which they were added."""
+    """All meshes over their targets on one page, each beside its picture, in the order in which they were added."""
 
     def __init__(self, n_images: int) -> None:
         self._n_columns = max(1, math.ceil((1.25 * n_images) ** 0.5))
-        self._size = max(viewer.MIN_SIZE, min(CELL_SIZE, PAGE_SIZE // self._n_columns))
+        self._size = max(viewer.MIN_SIZE, min(CELL_SIZE, int(PAGE_SIZE / (1 + PICTURE_SHARE)) // self._n_columns))
         self._cells: list[ByteArray] = []
 
     def __len__(self) -> int:
         return len(self._cells)
 
     def add(self, result: Result, silhouette: Silhouette) -> None:
-        """Draw a mesh, its name and its r_all beneath."""
+        """Draw a mesh, its name and its r_all beneath, its picture small on the left."""
         solution = result.solution
-        caption = f"{result.name}\nr_all {solution.score.total:.2f}"
-        self._cells.append(viewer.draw_mesh(solution.mesh, silhouette, size=self._size, caption=caption))
+        caption = f"{told(result.name, _MOST_CAPTION)}\nr_all {solution.score.total:.2f}"
+        cell = viewer.draw_mesh(solution.mesh, silhouette, size=self._size, caption=caption)
+        self._cells.append(np.hstack((self._margin(result.image, len(cell)), cell)))
+
+    def _margin(self, image: Path, height: int) -> ByteArray:
+        """The picture, as it was given, in a column of its own; an empty one if it is gone."""
+        side = max(1, round(PICTURE_SHARE * self._size))
+        column = Image.new("RGB", (side, height), viewer.PAPER)
+        try:
+            picture = thumbnail(image, side - 2)
+        except AutoPolyError:
+            return np.asarray(column)
+        framed = ImageOps.expand(picture, 1, viewer.SOFT_INK)
+        column.paste(framed, (0, round(viewer.MARGIN * self._size)))
+        return np.asarray(column)
 
     def page(self) -> Image.Image:
         """The page, at least one mesh on it."""

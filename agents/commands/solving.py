@@ -11,9 +11,12 @@ import numpy as np
 
 from agents.base import Agent
 from agents.budget import Budget
+from agents.commands import pictures
 from agents.commands.ctrl_c import CtrlC
+from agents.commands.losses import in_words, losses_of
 from agents.commands.report import Report
 from agents.commands.results import OVERVIEW, RESULTS, Overview, Result, write_results
+from agents.commands.running import TOLD
 from agents.commands.wishes import NO_WISHES, Wishes
 from agents.contract import solved
 from agents.entry import AgentEntry
@@ -21,10 +24,11 @@ from agents.registry import find_agent
 from autopoly_env.compute import n_threads
 from autopoly_env.errors import AutoPolyError, ConfigError
 from autopoly_env.export import save_png
+from autopoly_env.files import file_stem
 from autopoly_env.mesh import face_rule
 from autopoly_env.outside import described
 from autopoly_env.score import ScoreWeights
-from autopoly_env.silhouette import Silhouette, load_silhouette
+from autopoly_env.silhouette import DEFAULT_OPTIONS, SMALL, ObjectOptions, Silhouette, load_silhouette
 from autopoly_env.simulator import Simulator
 
 
@@ -42,6 +46,8 @@ class Settings:
     budget: Budget
     wishes: Wishes = NO_WISHES
     faces: str = "any"  # the rule of faces
+    picture: ObjectOptions = DEFAULT_OPTIONS
+    show_mask: bool = False
 
     def check(self) -> None:
         """Raise ConfigError for whatever is wrong, before any image is read."""
@@ -76,8 +82,13 @@ class Settings:
     def as_dict(self) -> dict[str, Any]:
         """What a construction sequence keeps beside the simulator's settings."""
         budget = asdict(self.budget)
-        settings = {"agent": self._entry.name, "options": self._options, "seed": self._seed, "budget": budget}
-        return {**settings, "guided_by": self.wishes.files} if self.wishes.files else settings
+        settings: dict[str, Any] = {"agent": self._entry.name, "options": self._options, "seed": self._seed}
+        settings["budget"] = budget
+        if self.wishes.files:
+            settings["guided_by"] = self.wishes.files
+        if self.picture != DEFAULT_OPTIONS:
+            settings["picture"] = pictures.as_dict(self.picture)
+        return settings
 
     @cached_property
     def _entry(self) -> AgentEntry:
@@ -113,7 +124,7 @@ def name_jobs(images: Sequence[Path], out: Path) -> list[Job]:
     taken = {OVERVIEW: OVERVIEW}
     jobs = []
     for image in images:
-        stem = image.stem.encode("utf-8", "replace").decode().lstrip(".") or "image"
+        stem = file_stem(image)
         name, count = stem, 1
         while name.casefold() in taken:
             count += 1
@@ -121,7 +132,8 @@ def name_jobs(images: Sequence[Path], out: Path) -> list[Job]:
         notes = () if count == 1 else (f"warning: called {name} here, for {taken[stem.casefold()]} has its name, too",)
         taken[name.casefold()] = str(image)
         jobs.append(Job(image, name, notes))
-    results = {(out / path).resolve() for job in jobs for path in (*(f"{job.name}/{f}" for f in RESULTS), OVERVIEW)}
+    names = (*RESULTS, pictures.MASK)
+    results = {(out / path).resolve() for job in jobs for path in (*(f"{job.name}/{f}" for f in names), OVERVIEW)}
     for image in images:
         if image.resolve() in results:
             raise ConfigError(f"the results would overwrite the image {image}; give another folder with --out")
@@ -137,10 +149,10 @@ def solve_all(jobs: Sequence[Job], settings: Settings, out: Path, report: Report
             report.finish(_write_overview(overview, out, report))
         except KeyboardInterrupt:
             report.say("aborted by Ctrl-C; the files that were written are whole")
-            return 130
+            return TOLD
     if ctrl_c.n_pressed:
         report.say(f"stopped by Ctrl-C: {n_left} of {len(jobs)} images left")
-        return 130
+        return TOLD
     return 1 if report.n_failed else 0
 
 
@@ -185,15 +197,25 @@ def _load_kernels(settings: Settings, ctrl_c: CtrlC) -> None:
 
 def _solve(job: Job, settings: Settings, out: Path, report: Report, ctrl_c: CtrlC) -> tuple[Result, Silhouette]:
     """Solve an image and write its results."""
-    silhouette = load_silhouette(job.image, name=job.name)
+    silhouette = load_silhouette(job.image, name=job.name, options=settings.picture)
     simulator, agent = settings.simulator(silhouette), settings.new_agent()
     with ctrl_c.searching():
-        solution = solved(agent, simulator, settings.budget, report.progress)
+        solution = solved(agent, simulator, settings.budget, ctrl_c.heeding(report.progress))
+    losses = losses_of(solution, simulator)
+    lost = in_words(losses, simulator)
+    own = {**settings.as_dict(), **({"lost": lost} if lost else {})}
     sequence = solution.sequence
-    sequence = replace(sequence, settings={**sequence.settings, **settings.as_dict()})
+    sequence = replace(sequence, settings={**sequence.settings, **own})
     solution = replace(solution, sequence=sequence)
-    files = write_results(out / job.name, solution, silhouette, ctrl_c.shielded)
-    return Result(job.image, job.name, solution, (*job.notes, *silhouette.notes), files), silhouette
+    files = write_results(out / job.name, solution, silhouette, ctrl_c.shielded, with_mask=settings.show_mask)
+    notes = [*job.notes, *silhouette.notes, *_notes_on_scoring(silhouette), *([lost] if lost else [])]
+    return Result(job.image, job.name, solution, tuple(notes), files, losses), silhouette
+
+
+def _notes_on_scoring(silhouette: Silhouette) -> list[str]:
+    if not silhouette.is_scored_by_area:
+        return []
+    return [f"fewer than {SMALL} pixels a side ({silhouette.resolution}): r_sm is of exact areas"]
 
 
 def _write_overview(overview: Overview, out: Path, report: Report) -> Path | None:

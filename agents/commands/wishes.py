@@ -7,7 +7,7 @@ from typing import Any
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import AutoPolyError, ConfigError
 from autopoly_env.export import load_obj
-from autopoly_env.guidance import read_importance
+from autopoly_env.guidance import KEPT, read_importance
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.sequence import ConstructionSequence
 
@@ -20,6 +20,7 @@ class Wishes:
     start: PolyMesh | ConstructionSequence | None = None
     locked: tuple[int, ...] = ()
     symmetry: bool | float | None = None
+    keep: str | None = None  # holes, parts or all
     files: dict[str, str] = field(default_factory=dict)  # by option, where it came from
 
     def for_simulator(self) -> dict[str, Any]:
@@ -29,18 +30,24 @@ class Wishes:
             "start": self.start,
             "locked": self.locked,
             "symmetry": self.symmetry,
+            "keep": self.keep,
         }
 
 
 NO_WISHES = Wishes()
 
 
-def read_wishes(importance: Path | None, start: Path | None, lock: str | None, symmetry: str | None) -> Wishes:
+def read_wishes(
+    importance: Path | None, start: Path | None, lock: str | None, symmetry: str | None, keep: str | None = None
+) -> Wishes:
     """The wishes behind the options as they were typed. Raises ConfigError that names the option that is wrong."""
     levels = None if importance is None else read_importance(importance)
     mesh = None if start is None else _read_start(start)
     files = {"importance": importance, "start": start}
-    return Wishes(levels, mesh, _ids(lock), _axis(symmetry), {k: str(path) for k, path in files.items() if path})
+    if keep is not None and keep not in KEPT:
+        raise ConfigError(f"--keep {keep}: expected one of {', '.join(KEPT)}")
+    named = {name: str(path) for name, path in files.items() if path}
+    return Wishes(levels, mesh, _ids(lock), _axis(symmetry), keep, named)
 
 
 def _read_start(path: Path) -> PolyMesh | ConstructionSequence:

@@ -18,7 +18,7 @@ from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import Action, Choice
 from autopoly_env.score import Score
 from autopoly_env.sequence import ConstructionSequence
-from autopoly_env.sequence.file import Score as PlainScore
+from autopoly_env.sequence.file import PlainScore
 from autopoly_env.simulator import Simulator, State
 
 
@@ -49,7 +49,7 @@ def _finish(
         meter.add_refits(n_refits)
         versions += [pared] if n_taken else []
     solutions = [_told(simulator, version, meter, keep_steps, keep_shape) for version in versions]
-    return max(solutions, key=lambda solution: solution.score.total)
+    return max(solutions, key=lambda solution: simulator.worth(solution.mesh))
 
 
 def _told(simulator: Simulator, states: Sequence[State], meter: Meter, keep_steps: bool, keep_shape: bool) -> Solution:
@@ -57,7 +57,8 @@ def _told(simulator: Simulator, states: Sequence[State], meter: Meter, keep_step
     if not keep_shape and (len(meshes) > 1 or simulator.guidance.start is None):
         meshes[-1] = _polished(simulator, meshes)
     scores = [simulator.final_score(mesh) for mesh in meshes]
-    docked = [0.0, *(simulator.docked(*pair) for pair in pairwise(meshes))]
+    docked = [simulator.off(mesh) for mesh in meshes]
+    docked[1:] = (off + simulator.docked(*pair) for off, pair in zip(docked[1:], pairwise(meshes), strict=True))
     last = max(range(len(scores)), key=lambda k: (scores[k].total - docked[k], -k))
     settings = {**simulator.settings(), "scored_at": simulator.silhouette.resolution}
     transitions = [
@@ -80,7 +81,7 @@ def _polished(simulator: Simulator, meshes: Sequence[PolyMesh]) -> PolyMesh:
     polished = simulator.polish(mesh)
     if not before or not simulator.docked(before[-1], polished):
         return polished
-    worth = [simulator.final_score(m).total - simulator.docked(before[-1], m) for m in (polished, mesh)]
+    worth = [simulator.worth(m) - simulator.docked(before[-1], m) for m in (polished, mesh)]
     return polished if worth[0] >= worth[1] else mesh
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from autopoly_env.errors import IllegalActionError
 from autopoly_env.operators import STOP, Action, operator_named
-from autopoly_env.simulator import Simulator, State
+from autopoly_env.simulator import MANY_VERTICES, Simulator, State
 
 _N_TRIED = 4  # removals that are refitted, those that are worth most as they are
 
@@ -14,16 +14,18 @@ def pare(simulator: Simulator, states: Sequence[State]) -> tuple[list[State], in
     """The states, and those of removing actions after them as long as each scores better; the numbers of refits that it
     took, and of actions that were added.
 
-    Only actions that the simulator allows are taken, and none where nothing has been done or the steps are used up.
+    Only actions that the simulator allows are taken, and none where nothing has been done or the steps are used up, or
+    from a mesh of many vertices.
     """
     pared, n_refits, n_added = [state for state in states if state.action != STOP], 0, 0
-    while len(pared) > 1 and pared[-1].step < simulator.max_steps:
+    while len(pared) > 1 and pared[-1].step < simulator.max_steps and len(pared[-1].mesh.vertices) <= MANY_VERTICES:
         state = replace(pared[-1], done="")
+        n_before = simulator.n_refits
         children = simulator.transition_all(state, _most_promising(simulator, state))
-        n_refits += sum(child.n_refits for child in children)
-        sane = (child for child in children if simulator.is_sane(child.mesh))
-        best = max(sane, key=lambda child: child.score.total, default=state)
-        if best.score.total <= state.score.total:
+        n_refits += simulator.n_refits - n_before
+        sane = (child for child in children if simulator.is_sound(child.mesh))
+        best = max(sane, key=simulator.standing, default=state)
+        if simulator.standing(best) <= simulator.standing(state):
             break
         pared.append(best)
         n_added += 1

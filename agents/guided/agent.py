@@ -48,10 +48,11 @@ class NfapMctsAgent(Agent):
         """
         best_total, failures = track.state.score.total, 0
         while not track.state.done and failures < self._config.patience and not meter.spent():
+            n_before = simulator.n_refits
             following = self._step(simulator, track.state)
             if following is None:
                 return
-            meter.add([following])
+            meter.add([following], simulator.n_refits - n_before)
             track = Track(following, track)
             yield track
             failures += 1

@@ -3,6 +3,7 @@
 Letters: S pixels a side of a network's pictures, n stages of nFAP-Net, K operator classes, M x M grid of WarpNet.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -110,8 +111,8 @@ class NfapPriorConfig(MctsConfig):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.temperature > 0.0:
-            raise ConfigError(f"temperature = {self.temperature}: expected a number above 0")
+        if not 0.0 < self.temperature < math.inf:
+            raise ConfigError(f"temperature = {self.temperature}: expected a finite number above 0")
 
 
 @dataclass(frozen=True)

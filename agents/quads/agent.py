@@ -48,7 +48,7 @@ class QuadsAgent(WholeAgent):
         self._config = config
 
     def check(self, simulator: Simulator) -> None:
-        """As every agent. Raises ConfigError for a simulator in whose operators quads cannot be told, too."""
+        """As every agent; raises ConfigError, too, where quads cannot be told with the operators, or faces may be any."""
         super().check(simulator)
         missing = [name for name in OPERATORS if name not in simulator.operators]
         if missing:
@@ -56,6 +56,8 @@ class QuadsAgent(WholeAgent):
                 f"quads builds with {', '.join(OPERATORS)}, and {missing[0]} is not among the operators: "
                 "give the preset modeller"
             )
+        if simulator.faces == "any":
+            raise ConfigError("quads builds convex faces: give faces=quads or convex")
 
     def _find(self, simulator: Simulator, meter: Meter) -> Solution:
         if meter.rest() == Budget():
@@ -79,7 +81,7 @@ def best_build(hill: QuadHill, places: Sequence[QuadPlace], n_polished: int) -> 
     distinct = {place.total: place for place in places if place.partition is not None}
     best = sorted(distinct.values(), key=total_of, reverse=True)[:n_polished]
     meshes = [mesh for found in map_threads(hill.polished, best) for mesh in found]
-    worth = [hill.simulator.final_score(mesh).total for mesh in meshes]
+    worth = [hill.simulator.worth(mesh) for mesh in meshes]
     chosen: list[State] = []
     most = float("-inf")
     for k in sorted(range(len(meshes)), key=lambda k: -worth[k]):
@@ -89,7 +91,7 @@ def best_build(hill: QuadHill, places: Sequence[QuadPlace], n_polished: int) -> 
             states = build(hill.simulator, meshes[k])[: hill.simulator.max_steps + 1]
         except UnbuildableError:
             continue
-        total = max(hill.simulator.final_score(state.mesh).total for state in states)
+        total = max(hill.simulator.worth(state.mesh) for state in states)
         if total > most:
             chosen, most = states, total
     return chosen

@@ -12,13 +12,12 @@ from agents.trace.outline import Outline
 from agents.trace.rings import trace_rings
 from autopoly_env.compute import map_threads
 from autopoly_env.mesh import PolyMesh, is_sane
-from autopoly_env.refit import LOCAL, RefitConfig, refit, tune
+from autopoly_env.refit import RefitConfig
 from autopoly_env.score import Score, intersection_over_union
 from autopoly_env.simulator import Simulator
 
 _UNCUT = 50.0  # points of r_all that an outline loses which cannot be cut
 _N_LIKELY = 30  # neighbours that are cut before one is tried
-_N_REFINED = 3  # refits at the finest resolution, at most
 _TRIANGLE = 0.5  # elements that a triangle is thought to cost beside its own
 
 
@@ -28,7 +27,7 @@ class QuadPlace(NamedTuple):
     outline: Outline
     partition: Partition | None
     score: Score
-    total: float  # r_all, less a little for triangles
+    total: float  # r_all, less a little for triangles and what is off in choosing
 
 
 def total_of(place: QuadPlace) -> float:
@@ -71,9 +70,9 @@ class QuadHill:
             return QuadPlace(outline, None, score, score.total - _UNCUT)
         complexity = complexity_of(outline, len(partition.faces))
         total = score.total - w_sc * (complexity - score.complexity)
-        n_triangles = len(partition.faces) - partition.n_quads
+        off = w_sc * _TRIANGLE * (len(partition.faces) - partition.n_quads) + self.simulator.off(outline.loops)
         score = Score(score.iou, complexity, score.self_intersections, total)
-        return QuadPlace(outline, partition, score, total - w_sc * _TRIANGLE * n_triangles)
+        return QuadPlace(outline, partition, score, total - off)
 
     def fit(self, outlines: list[Outline], config: RefitConfig, iou: float) -> list[QuadPlace]:
         """Each outline refitted, on all cores, on the way to more than `iou`."""
@@ -93,7 +92,7 @@ class QuadHill:
         """The mesh of a place, refitted and tuned under the rule at the finest resolution; none if it has defects."""
         assert place.partition is not None
         mesh = mesh_of(place.outline, place.partition)
-        return [polished(self.simulator, mesh)] if is_sane(mesh, "quads") else []
+        return [self.simulator.polish(mesh)] if is_sane(mesh, "quads") else []
 
     def shaken(self, place: QuadPlace, rng: np.random.Generator) -> Outline:
         """An outline a few random moves away."""
@@ -103,19 +102,6 @@ class QuadHill:
 def _best_first(worth: Sequence[float]) -> list[int]:
     order: list[int] = np.argsort(-np.array(worth), kind="stable").tolist()
     return order
-
-
-def polished(simulator: Simulator, mesh: PolyMesh) -> PolyMesh:
-    """The mesh refitted and tuned under the rule at the silhouette's own resolution: no worse than it was."""
-    best, score = mesh, simulator.final_score(mesh)
-    for _ in range(_N_REFINED):
-        fitted = refit(best, simulator.refit_target(score.iou, simulator.finest), LOCAL, faces="quads").mesh
-        fitted_score = simulator.final_score(fitted)
-        if not fitted_score.total > score.total:
-            break
-        best, score = fitted, fitted_score
-    tuned = tune(best, simulator.silhouette.target(simulator.finest), faces="quads")
-    return max((best, tuned), key=lambda candidate: simulator.final_score(candidate).total)
 
 
 def complexity_of(outline: Outline, n_faces: int) -> int:

@@ -11,7 +11,7 @@ from autopoly_env.errors import AutoPolyError, SequenceError
 from autopoly_env.mesh import PolyMesh, is_sane
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence.deformation import ThinPlate
-from autopoly_env.sequence.follower import Place
+from autopoly_env.sequence.follower import PointMap
 
 N_TRIES = 50  # draws for a variant before it is given up
 EARLY = 0.35  # share of the steps, from the start, that are edited
@@ -145,7 +145,7 @@ def _fitting(moved: list[FloatArray]) -> tuple[float, FloatArray]:
     return scale, np.clip(0.0, _MARGIN - scale * low, 1.0 - _MARGIN - scale * high)
 
 
-def _place(k: int, bend: Place, scale: float, shift: FloatArray, i: int) -> Place:
+def _place(k: int, bend: PointMap, scale: float, shift: FloatArray, i: int) -> PointMap:
     """Where the points of mesh i go: bent from step k on, then scaled and shifted."""
     return lambda points: scale * (bend(points) if i >= k else points) + shift
 

@@ -3,6 +3,7 @@
 Letters: N `max_vertices`, R pixels a side of the observed pictures.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -115,8 +116,8 @@ class RlConfig:
     def __post_init__(self) -> None:
         if self.k < 1 or self.seed < 0:
             raise ConfigError(f"{self}: expected k of at least 1 and a seed of at least 0")
-        if not self.temperature > 0.0:
-            raise ConfigError(f"temperature = {self.temperature}: expected a number above 0")
+        if not 0.0 < self.temperature < math.inf:
+            raise ConfigError(f"temperature = {self.temperature}: expected a finite number above 0")
 
 
 @dataclass(frozen=True)
@@ -136,5 +137,5 @@ class RlPriorConfig(MctsConfig):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.temperature > 0.0:
-            raise ConfigError(f"temperature = {self.temperature}: expected a number above 0")
+        if not 0.0 < self.temperature < math.inf:
+            raise ConfigError(f"temperature = {self.temperature}: expected a finite number above 0")

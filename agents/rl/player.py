@@ -113,10 +113,11 @@ class Player:
     ) -> Iterator[Track]:
         """Play on from `track` until the policy stops, its padding is full or the budget is spent; yield every step."""
         while not track.state.done and not meter.spent():
+            n_before = simulator.n_refits
             following = self._step(simulator, track.state, rng, temperature)
             if following is None:
                 return
-            meter.add([following])
+            meter.add([following], simulator.n_refits - n_before)
             track = Track(following, track)
             yield track
             if not self.fits(following):  # an action and its mirror image may need more room than one has

@@ -1,5 +1,6 @@
 """`MctsConfig`: every choice of the search, and the paper's choices."""
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,7 +11,7 @@ from autopoly_env.errors import ConfigError
 class MctsConfig:
     """How `mcts` searches."""
 
-    seeds: tuple[str, ...] = ("climb", "decimate", "quads")  # whose best shape it goes on from; those that suit
+    seeds: tuple[str, ...] = ("trace", "climb", "decimate", "quads")  # whose best it goes on from; those that suit
     n_simulations: int = 16  # before a step is committed
     prior: Literal["residual", "uniform"] = "residual"
     formula: Literal["puct", "uct"] = "puct"
@@ -37,6 +38,8 @@ class MctsConfig:
         for name, bound in least.items():
             if not getattr(self, name) >= bound:
                 raise ConfigError(f"{name} = {getattr(self, name)}: expected at least {bound}")
+        if not math.isfinite(self.exploration):
+            raise ConfigError(f"exploration = {self.exploration}: expected a finite number")
         if not 0.0 <= self.tree_share <= 1.0:
             raise ConfigError(f"tree_share = {self.tree_share}: expected a share, 0 to 1")
         if not 0.0 <= self.widening <= 1.0:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from agents.base import Agent
-from agents.budget import Meter, Progress
+from agents.budget import Budget, Meter, Progress
 from agents.contract import solved
 from agents.solution import Solution, Track
 from autopoly_env.mesh import PolyMesh
@@ -17,8 +17,10 @@ SHARE = 0.6  # of what is left of the budget, that an incumbent may use
 _MOST_AT_ONCE = 2  # steps of a sequence that are one of the simulator's: an action and its mirror image
 
 
-def play(agents: Sequence[Agent], simulator: Simulator, meter: Meter) -> Iterator[Solution]:
+def play(agents: Sequence[Agent], simulator: Simulator, meter: Meter, n_most: int | None = None) -> Iterator[Solution]:
     """The agents' solutions, as far as the budget goes. Raises KeyboardInterrupt after one that was interrupted.
+
+    Each has a share of what is left of the budget; where that has no limits, `n_most` refits.
 
     Agents that do not suit the simulator, by its guidance, rule of faces or operators, are left out.
     """
@@ -27,14 +29,15 @@ def play(agents: Sequence[Agent], simulator: Simulator, meter: Meter) -> Iterato
             return
         if not agent.suits(simulator):
             continue
-        solution = _solve_within(agent, simulator, meter)
+        budget = meter.rest().share(SHARE)
+        solution = _solve_within(agent, simulator, meter, budget if n_most is None else Budget(n_most))
         yield solution
         if solution.stats.stopped_by == "interrupted":
             raise KeyboardInterrupt
 
 
-def _solve_within(agent: Agent, simulator: Simulator, meter: Meter) -> Solution:
-    """What the agent finds with the rest of the meter's budget; its work is counted and reported as it goes."""
+def _solve_within(agent: Agent, simulator: Simulator, meter: Meter, budget: Budget) -> Solution:
+    """What the agent finds within the budget; its work is counted and reported as it goes."""
     n_counted = 0
 
     def report(progress: Progress) -> None:
@@ -42,8 +45,7 @@ def _solve_within(agent: Agent, simulator: Simulator, meter: Meter) -> Solution:
         n_new, n_counted = progress.n_refits - n_counted, progress.n_refits
         meter.count(n_new, progress.best_total)
 
-    budget = replace(meter.rest().share(SHARE), simulations=None)
-    solution = solved(agent, simulator, budget, report)
+    solution = solved(agent, simulator, replace(budget, simulations=None), report)
     meter.add_refits(solution.stats.n_refits - n_counted)
     return solution
 

@@ -24,6 +24,8 @@ from agents.solution import Solution, Track
 from autopoly_env.operators import STOP
 from autopoly_env.simulator import Simulator, State
 
+_FREE = 2  # times `n_refits`, that each incumbent may take where no budget is given
+_LEAST_SHARE = 0.16  # of `n_refits` for the search, however much the incumbents took
 _EVALUATORS: dict[str, type[UniformEvaluator]] = {"residual": ResidualEvaluator, "uniform": UniformEvaluator}
 
 
@@ -59,29 +61,43 @@ class MctsAgent(Agent):
         budget: Budget | None = None,
         on_progress: Callable[[Progress], None] | None = None,
     ) -> Solution:
-        """As every agent; never worse than the incumbents. A budget without limits is one of `config.n_refits`."""
-        if budget is None or budget == Budget():
-            budget = Budget(self._config.n_refits)
-        meter = Meter(budget, on_progress)
+        """As every agent; never worse than the incumbents.
+
+        Without a budget each incumbent may take twice `config.n_refits`, which lets nearly all run to their end; the
+        search has what they leave of `config.n_refits`, or a share of it where they leave less.
+        """
+        meter = Meter(budget or Budget(), on_progress)
         finds = _Finds(Track(simulator.initial()), Tops(Hill(simulator)) if self._hops(simulator) else None)
         try:
             meter.add([finds.best.state])
-            if not finds.best.state.done:
-                self._run_stages(simulator, finds, meter)
+            if finds.best.state.done in ("", "matched"):  # a rectangle that matches may have a corner too many
+                self._run_stages(simulator, finds, meter, is_free=budget is None or budget == Budget())
         except KeyboardInterrupt:
             meter.stopped_by = "interrupted"
         return finds.solution(simulator, meter)
 
-    def _run_stages(self, simulator: Simulator, finds: "_Finds", meter: Meter) -> None:
+    def _run_stages(self, simulator: Simulator, finds: "_Finds", meter: Meter, *, is_free: bool) -> None:
         """Seeds; a tree from the best shape and one from the rectangle; hops from outline to outline."""
         initial = finds.best
-        for solution in play(self._incumbents, simulator, meter):
+        for solution in play(self._incumbents, simulator, meter, self._config.n_refits * _FREE if is_free else None):
             finds.incumbents.append(solution)
-            finds.offer(track_of(simulator, solution.sequence))
+            finds.offer(simulator, track_of(simulator, solution.sequence))
+        if initial.state.done:
+            return
+        if is_free:
+            n_most = self._config.n_refits
+            n_left = max(n_most - meter.stats().n_refits, round(_LEAST_SHARE * n_most))
+            search = Meter(Budget(n_left), whole=meter)
+            self._search_all(simulator, finds, search, initial)
+            meter.stopped_by = search.stopped_by
+        else:
+            self._search_all(simulator, finds, meter, initial)
+
+    def _search_all(self, simulator: Simulator, finds: "_Finds", meter: Meter, initial: Track) -> None:
         for start in [initial] if finds.best is initial else [finds.best, initial]:
             part = meter.part(1.0 if finds.tops is None else self._config.tree_share)
             for track in self._search(simulator, start, part):
-                finds.offer(track)
+                finds.offer(simulator, track)
         if finds.tops is not None:
             for mesh in (finds.best.state.mesh, *(solution.mesh for solution in finds.incumbents)):
                 finds.tops.add_mesh(mesh)
@@ -119,9 +135,9 @@ class _Finds:
     tops: Tops | None  # None where the search does not go on among outlines
     incumbents: list[Solution] = field(default_factory=list)
 
-    def offer(self, track: Track) -> None:
+    def offer(self, simulator: Simulator, track: Track) -> None:
         """Keep the track if it leads to a better shape than the best so far."""
-        if track.state.score.total > self.best.state.score.total:
+        if simulator.standing(track.state) > simulator.standing(self.best.state):
             self.best = track
 
     def solution(self, simulator: Simulator, meter: Meter) -> Solution:
@@ -129,7 +145,7 @@ class _Finds:
         found = [*self.incumbents, finish(simulator, self.best.states(), meter)]
         if self.tops is not None and self.tops.places():
             found.append(finish(simulator, self.tops.built(), meter))
-        chosen = max(found, key=lambda solution: solution.score.total)
+        chosen = max(found, key=lambda solution: simulator.worth(solution.mesh))
         return Solution(chosen.sequence, chosen.mesh, chosen.score, meter.stats())
 
 

@@ -81,13 +81,15 @@ class Search:
         if not children:
             back_up(node, node.total, self._seen, self._config.discount)
         for child in children:
+            n_before = self._simulator.n_refits
             played = roll_out(self._simulator, self._evaluator, child.track, self._config.n_rollout, self._rng)
+            n_refits = self._simulator.n_refits - n_before
             totals = [child.total, *(track.state.score.total for track in played)]
             value = value_of(totals, self._config.value, self._config.discount)
             back_up(child, value, self._seen, self._config.discount)
-            if played:
+            if played or n_refits:
                 yield from played
-                meter.add([track.state for track in played])
+                meter.add([track.state for track in played], n_refits)
 
     def _select(self, node: Node) -> Node:
         """Down to the first node that may have more children than it has, or can have none."""
@@ -114,12 +116,15 @@ class Search:
         """Try the next actions of a node in one batch of refits; yield what they make, return the new children."""
         untried = node.untried or []
         batch, node.untried = dict(untried[: self._config.n_expanded]), untried[self._config.n_expanded :]
+        n_before = self._simulator.n_refits
         states = self._evaluator.expand(self._simulator, node.track.state, list(batch)) if batch else []
-        made = [Node(Track(s, node.track), node, batch[s.action]) for s in states if s.action and self._is_new(s)]
+        n_refits = self._simulator.n_refits - n_before
+        fresh = [s for s in states if not self._simulator.hairlines(s.mesh) and self._is_new(s)]
+        made = [Node(Track(s, node.track), node, batch[s.action]) for s in fresh if s.action]
         node.children += made
         yield from (child.track for child in made)
         meter.add_simulation(len(made))
-        meter.add(states)
+        meter.add(states, n_refits)
         return made
 
     def _is_new(self, state: State) -> bool:

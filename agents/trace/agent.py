@@ -4,7 +4,7 @@ For every contour the best polygon of every size is known (`simplify`). A sweep 
 each, all are refitted together, and the outline with the best score is told as a construction sequence (`construct`).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain, count
 
@@ -27,6 +27,7 @@ from autopoly_env.simulator import Simulator, State
 
 _REFITS = (LOCAL, THOROUGH)
 _HIGHEST_PRICE = 1000.0
+_N_FINE = 2  # fine outlines that are refitted, the best as they are
 
 
 @dataclass(frozen=True)
@@ -65,14 +66,21 @@ class TraceAgent(WholeAgent):
         return finish(simulator, build_best(simulator, outlines, self._config.n_constructed), meter)
 
     def outlines(self, simulator: Simulator, meter: Meter) -> Iterator[Outline]:
-        """All outlines of the sweep that can be built, each refitted in two ways and then as it was."""
+        """All outlines of the sweep that can be built, each refitted in two ways and then as it was.
+
+        Of those that are fine the best two are refitted, in one way.
+        """
         pixels = simulator.silhouette.target(simulator.resolution)
-        for outline in self.sweep(simulator, trace_rings(simulator.silhouette)):
+        outlines = list(self.sweep(simulator, trace_rings(simulator.silhouette)))
+        fine = [k for k, outline in enumerate(outlines) if outline.is_fine]
+        rough = sorted(fine, key=lambda k: -final_total(simulator, outlines[k]))[_N_FINE:]
+        for k, outline in enumerate(outlines):
             if meter.spent():
                 return
+            configs = () if k in rough else (LOCAL,) if outline.is_fine else _REFITS
             target = simulator.refit_target(outline.score(pixels, simulator.weights).iou)
-            found = [*(outline.refitted(target, config) for config in _REFITS), outline]
-            meter.count(len(_REFITS), max(final_total(simulator, o) for o in found))
+            found = [*(outline.refitted(target, config) for config in configs), outline]
+            meter.count(len(configs), max(final_total(simulator, o) for o in found))
             yield from found
 
     def sweep(self, simulator: Simulator, rings: Sequence[Ring], reach: Reach | None = None) -> Iterator[Outline]:
@@ -86,13 +94,19 @@ class TraceAgent(WholeAgent):
         contours = [ring.contour for ring in rings]
         area = float(simulator.silhouette.mask.mean())
         prices = self._config.prices
+        wanted = _wanted(rings, simulator.guidance.keep)
         seen: set[tuple[int, ...]] = set()
         found = False
         for price in chain(prices, (prices[-1] * 2.0**k for k in count(1))):
             if price > prices[-1] and (found or price > _HIGHEST_PRICE):
                 return
             weights = ScoreWeights(simulator.weights.w_sm, simulator.weights.w_sc * price)
-            sizes = _without_hidden(rings, list(choose_sizes(rings, contours, weights, area, reach)))
+            chosen = list(choose_sizes(rings, contours, weights, area, reach, wanted))
+            while any(finer := [_is_short(contour, n, reach) for contour, n in zip(contours, chosen, strict=True)]):
+                pairs = zip(contours, finer, strict=True)
+                contours = [contour.finer or contour if is_short else contour for contour, is_short in pairs]
+                chosen = list(choose_sizes(rings, contours, weights, area, reach, wanted))
+            sizes = _without_hidden(rings, chosen)
             if sizes not in seen:
                 seen.add(sizes)
                 outline = _outline(rings, contours, sizes)
@@ -101,12 +115,30 @@ class TraceAgent(WholeAgent):
                     yield outline
 
 
+def _wanted(rings: Sequence[Ring], keep: Collection[str]) -> set[int]:
+    """The rings that a user wants kept; a hole is kept with the part around it."""
+    holes = {k for k, ring in enumerate(rings) if ring.is_hole} if "holes" in keep else set()
+    parts = {k for k, ring in enumerate(rings) if not ring.is_hole} if "parts" in keep else set()
+    return holes | parts | {rings[k].parent for k in holes}
+
+
+def _is_short(contour: Contour, n_vertices: int, reach: Reach) -> bool:
+    """Whether a polygon of more vertices than the contour's longest one may be worth its price, and can be built."""
+    return contour.n_most == n_vertices < reach.n_steps and contour.finer is not None
+
+
 def choose_sizes(
-    rings: Sequence[Ring], contours: Sequence[Contour], weights: ScoreWeights, area: float, reach: Reach
+    rings: Sequence[Ring],
+    contours: Sequence[Contour],
+    weights: ScoreWeights,
+    area: float,
+    reach: Reach,
+    wanted: Collection[int] = (),
 ) -> Iterator[int]:
     """How many vertices each ring is worth, 0 for none; `area` is the silhouette's, in the unit square.
 
-    The error of a polygon, relative to `area`, is about the IoU that it costs.
+    The error of a polygon, relative to `area`, is about the IoU that it costs. Rings that are `wanted` are not left out
+    for what they cost.
     """
     kept: set[int] = set()
     for k, (ring, contour) in enumerate(zip(rings, contours, strict=True)):
@@ -115,7 +147,7 @@ def choose_sizes(
         sizes = range(allowed.start, min(allowed.stop, len(errors)))
         extra = 3 if ring.is_hole else 1  # edges and faces beyond one edge a vertex
         costs = [weights.w_sm * errors[n] / area + weights.w_sc * (2 * n + extra) for n in sizes]
-        worth_it = k == 0 or (sizes and min(costs) < weights.w_sm * abs(signed_area(ring.points)) / area)
+        worth_it = k == 0 or k in wanted or (sizes and min(costs) < weights.w_sm * abs(signed_area(ring.points)) / area)
         if not sizes or not worth_it:
             yield 0
             continue
@@ -144,8 +176,9 @@ def _outline(rings: Sequence[Ring], contours: Sequence[Contour], sizes: Sequence
 
 
 def final_total(simulator: Simulator, outline: Outline) -> float:
-    """r_all of an outline at the silhouette's own resolution."""
-    return outline.score(simulator.silhouette.target(simulator.silhouette.resolution), simulator.weights).total
+    """r_all of an outline at the silhouette's own resolution, less what is off it in choosing."""
+    target = simulator.silhouette.target(simulator.silhouette.resolution)
+    return outline.score(target, simulator.weights).total - simulator.off(outline.loops)
 
 
 def build_best(simulator: Simulator, outlines: Sequence[Outline], n_most: int) -> list[State]:
@@ -164,7 +197,7 @@ def build_best(simulator: Simulator, outlines: Sequence[Outline], n_most: int) -
         except UnbuildableError:
             continue
         n_built += 1
-        total = simulator.final_score(states[-1].mesh).total
+        total = simulator.worth(states[-1].mesh)
         if total > best_total:
             best, best_total = states, total
     return best or [simulator.initial()]

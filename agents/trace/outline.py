@@ -13,6 +13,7 @@ from autopoly_env.mesh import PolyMesh, Topology
 from autopoly_env.refit import RefitConfig, RefitTarget, refit
 from autopoly_env.score import Score, ScoreWeights, intersection_over_union, self_intersections
 from autopoly_env.silhouette import Target
+from autopoly_env.simulator import MANY_VERTICES
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,11 @@ class Outline:
         n, f = cycles.n_vertices, cycles.n_faces
         points = np.concatenate([ring.points for ring in self.rings])
         return PolyMesh(points, cycles, tuple(range(n)), tuple(range(f)), n, f)
+
+    @property
+    def is_fine(self) -> bool:
+        """Whether it has so many vertices that moves of single ones are not tried."""
+        return len(self.loops.vertices) > MANY_VERTICES
 
     @property
     def complexity(self) -> int:

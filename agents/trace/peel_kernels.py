@@ -4,8 +4,8 @@ import numpy as np
 
 from autopoly_env.arrays import BoolArray, FloatArray, IntArray
 from autopoly_env.compute import kernel
-from autopoly_env.mesh.geometry_kernels import orientation
-from autopoly_env.mesh.planar_kernels import segments_touch
+from autopoly_env.mesh.geometry_kernels import CLEARANCE, orientation
+from autopoly_env.mesh.planar_kernels import segments_near
 
 
 @kernel
@@ -52,7 +52,7 @@ def _may_drop(points: FloatArray, walls: FloatArray, after: IntArray, a: int, i:
         d = after[c]
         if c != b and _inside(points[c, 0], points[c, 1], ax, ay, cx, cy, bx, by):
             return False
-        if c != b and segments_touch(ax, ay, bx, by, points[c, 0], points[c, 1], points[d, 0], points[d, 1]):
+        if c != b and segments_near(ax, ay, bx, by, points[c, 0], points[c, 1], points[d, 0], points[d, 1], CLEARANCE):
             return False
         c = d
     if c != b and _inside(points[c, 0], points[c, 1], ax, ay, cx, cy, bx, by):
@@ -62,7 +62,7 @@ def _may_drop(points: FloatArray, walls: FloatArray, after: IntArray, a: int, i:
         at_end = (
             (ux == ax and uy == ay) or (vx == ax and vy == ay) or (ux == bx and uy == by) or (vx == bx and vy == by)
         )
-        if not at_end and segments_touch(ax, ay, bx, by, ux, uy, vx, vy):
+        if not at_end and segments_near(ax, ay, bx, by, ux, uy, vx, vy, CLEARANCE):
             return False
         if _inside(ux, uy, ax, ay, cx, cy, bx, by) or _inside(vx, vy, ax, ay, cx, cy, bx, by):
             return False

@@ -1,5 +1,6 @@
 """Closed contours of a silhouette: outer rings and holes, in the unit square."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -8,11 +9,10 @@ import shapely
 from skimage.measure import find_contours
 
 from agents.trace.simplify import Contour
-from autopoly_env.arrays import FloatArray
-from autopoly_env.silhouette import Silhouette
+from autopoly_env.arrays import BoolArray, FloatArray
+from autopoly_env.silhouette import LEVEL, Silhouette, torn_corners
 
 TRACE_RESOLUTION = 256  # contours are followed at the silhouette's own resolution, at most this
-_LEVEL = 0.4990123  # about half; a pixel covered by just this much would make contours touch, and none is
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,8 @@ def trace_rings(silhouette: Silhouette) -> list[Ring]:
 def _traced(silhouette: Silhouette) -> tuple[Ring, ...]:
     size = min(silhouette.resolution, TRACE_RESOLUTION)
     padded = np.pad(silhouette.target(size).coverage, 1)
-    loops = [(line[:-1, ::-1] - 0.5) / size for line in find_contours(padded, _LEVEL)]
+    lines = [line[:-1] for line in find_contours(padded, LEVEL, fully_connected="high")]
+    loops = [(line[:, ::-1] - 0.5) / size for line in _torn(lines, torn_corners(padded))]
     loops = [loop for loop in loops if len(loop) >= 3 and abs(signed_area(loop)) > 0.0]
     if not loops:
         return ()
@@ -67,3 +68,36 @@ def _traced(silhouette: Silhouette) -> tuple[Ring, ...]:
         if len(inside):
             rings.append(Ring(hole, int(inside[-1])))  # the smallest one around it
     return tuple(rings)
+
+
+def _torn(lines: list[FloatArray], corners: BoolArray) -> list[FloatArray]:
+    """The closed lines (n, 2) through pixels' centres and between them, taken apart at the corners (R-1, R-1) given.
+
+    Two lines, or two stretches of one, pass either side of the pixels that meet there; their ends are exchanged.
+    """
+    if not corners.any():
+        return lines
+    points = np.concatenate(lines)
+    ends = np.cumsum([0, *map(len, lines)])
+    following = np.arange(1, len(points) + 1)
+    following[ends[1:] - 1] = ends[:-1]
+    rows, columns = np.floor(0.5 * (points + points[following])).astype(np.int64).T
+    passing: dict[tuple[int, int], list[int]] = {}
+    for k in np.flatnonzero(corners[rows, columns]).tolist():
+        passing.setdefault((int(rows[k]), int(columns[k])), []).append(k)
+    for first, second in passing.values():
+        following[[first, second]] = following[[second, first]]
+    return [points[cycle] for cycle in _cycles(following.tolist())]
+
+
+def _cycles(following: list[int]) -> Iterator[list[int]]:
+    """The cycles of a permutation, each from its least element."""
+    seen = [False] * len(following)
+    for start in range(len(following)):
+        cycle, k = [], start
+        while not seen[k]:
+            seen[k] = True
+            cycle.append(k)
+            k = following[k]
+        if cycle:
+            yield cycle

@@ -36,12 +36,15 @@ def _triangle(points: FloatArray, a: int, b: int, c: int) -> float:
 
 
 @kernel
-def chord_errors(points: FloatArray) -> FloatArray:
-    """(n, n+1) area between the contour from point i to point j (n is point 0 again) and the chord, for i < j."""
+def chord_errors(points: FloatArray, longest: int) -> FloatArray:
+    """(n, n+1) area between the contour from point i to point j (n is point 0 again) and the chord, for i < j.
+
+    Infinite where a chord spans more than `longest` points.
+    """
     n = points.shape[0]
     errors = np.full((n, n + 1), np.inf)
     for i in range(n):
-        for j in range(i + 1, n + 1):
+        for j in range(i + 1, min(n, i + longest) + 1):
             ax, ay = points[i, 0], points[i, 1]
             dx, dy = points[j % n, 0] - ax, points[j % n, 1] - ay
             length = np.sqrt(dx * dx + dy * dy)
@@ -63,8 +66,8 @@ def chord_errors(points: FloatArray) -> FloatArray:
 
 
 @kernel
-def best_polygons(errors: FloatArray, n_most: int) -> tuple[FloatArray, IntArray]:
-    """The polygon of every size 1..n_most through point 0 that errs least.
+def best_polygons(errors: FloatArray, n_most: int, longest: int) -> tuple[FloatArray, IntArray]:
+    """The polygon of every size 1..n_most through point 0 that errs least; no chord spans more than `longest` points.
 
     Returns (n_most+1,) least errors and (n_most+1, n+1) where in the best way to point j with k chords the last chord
     begins: dynamic programming over the end of the last chord (Perez and Vidal 1994, "Optimum polygonal approximation
@@ -76,7 +79,7 @@ def best_polygons(errors: FloatArray, n_most: int) -> tuple[FloatArray, IntArray
     least[0, 0] = 0.0
     for k in range(1, n_most + 1):
         for j in range(k, n + 1):
-            for i in range(k - 1, j):
+            for i in range(max(k - 1, j - longest), j):
                 error = least[k - 1, i] + errors[i, j]
                 if error < least[k, j]:
                     least[k, j] = error

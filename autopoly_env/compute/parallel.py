@@ -6,7 +6,9 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cache
 from typing import TypeVar
 
+from autopoly_env.arguments import is_count
 from autopoly_env.errors import ConfigError
+from autopoly_env.shown import short
 
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
@@ -20,8 +22,8 @@ def n_threads() -> int:
     given = os.environ.get("AUTOPOLY_THREADS", "")
     if not given:
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    if not given.isdecimal() or int(given) < 1:
-        raise ConfigError(f"AUTOPOLY_THREADS={given!r}: expected a whole number of at least 1")
+    if not is_count(given) or int(given) < 1:
+        raise ConfigError(f"AUTOPOLY_THREADS={short(given)}: expected a whole number of at least 1")
     return int(given)
 
 

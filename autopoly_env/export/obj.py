@@ -6,8 +6,10 @@ from pathlib import Path
 from autopoly_env.errors import MeshError
 from autopoly_env.export.formats import Export, Format, register_format
 from autopoly_env.export.solid import to_solid_obj
-from autopoly_env.files import write_atomically
+from autopoly_env.files import read_text, write_atomically
 from autopoly_env.mesh import PolyMesh
+
+MOST_BYTES = 16_000_000  # of a file
 
 
 def to_obj(mesh: PolyMesh) -> str:
@@ -68,10 +70,9 @@ def from_obj(text: str) -> PolyMesh:
 def load_obj(path: str | os.PathLike[str]) -> PolyMesh:
     """The mesh in an OBJ file. Raises MeshError as `from_obj`, or if the file cannot be read."""
     try:
-        text = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "not text"
-        raise MeshError(f"cannot read {path} ({reason}); give an OBJ file") from None
+        text = read_text(path, MOST_BYTES)
+    except OSError as error:
+        raise MeshError(f"cannot read {path} ({error.strerror}); give an OBJ file") from None
     try:
         return from_obj(text)
     except MeshError as error:

@@ -13,6 +13,7 @@ from autopoly_env.export.formats import Export, Format, register_format
 from autopoly_env.files import write_atomically
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.sequence import ConstructionSequence, Lesson, parts_of
+from autopoly_env.shown import told
 from autopoly_env.silhouette import Silhouette
 
 BORDER = 24  # pixels around the page
@@ -95,7 +96,7 @@ def _captions(sequence: ConstructionSequence) -> list[str]:
     scores = [sequence.start_score, *(step.score for step in sequence.steps)]
     captions = []
     for i, (operator, score) in enumerate(zip(operators, scores, strict=True)):
-        lines = [f"{i}  {operator}", f"r_all {score['total']:.2f}   IoU {score['iou']:.3f}"]
+        lines = [f"{i}  {told(operator, 40)}", f"r_all {score['total']:.2f}   IoU {score['iou']:.3f}"]
         if len(parts.names) > 1:
             lines.insert(1, parts.name(i) if i else parts.names[0])
         captions.append("\n".join(lines))
@@ -135,7 +136,7 @@ def _mark(cell: Image.Image, size: int, word: str, colour: viewer.Colour) -> Non
 
 def _draw_header(sequence: ConstructionSequence, silhouette: Silhouette | None) -> Image.Image:
     """The name of the target, the scores of the best mesh, and what the colours mean; HEADER pixels high."""
-    title = viewer.printable(silhouette.name if silhouette else "construction sequence")
+    title = viewer.printable(told(silhouette.name, 80) if silhouette else "construction sequence")
     best = sequence.best_prefix()
     facts, lesson = _facts(best, len(sequence.steps)), _lesson_words(Lesson.of(best))
     legend = LEGEND if silhouette else LEGEND[-1:]

@@ -1,10 +1,12 @@
 """What a user may ask of a construction: where matching matters, a start, locked vertices, symmetry."""
 
-from autopoly_env.guidance.guidance import Guidance, continued, importance_settings
+from autopoly_env.guidance.guidance import KEPT, MOST_CORNERS, Guidance, continued, importance_settings
 from autopoly_env.guidance.importance import ImportanceSource, read_importance, weighted
 from autopoly_env.guidance.symmetry import best_axis
 
 __all__ = [
+    "KEPT",
+    "MOST_CORNERS",
     "Guidance",
     "ImportanceSource",
     "best_axis",

@@ -10,15 +10,19 @@ from typing import Any
 
 import numpy as np
 
+from autopoly_env.arguments import number
 from autopoly_env.errors import ConfigError, IllegalActionError, MeshError
 from autopoly_env.guidance.symmetry import best_axis
 from autopoly_env.mesh import PolyMesh, canonical_hash, defects_of, images_of, validate
 from autopoly_env.operators import OPERATORS, Action, describe
 from autopoly_env.refit import Bonds
 from autopoly_env.sequence import ConstructionSequence
+from autopoly_env.shown import short
 from autopoly_env.silhouette import Silhouette
 
+MOST_CORNERS = 2000  # of a mesh to start from: a refit takes memory by their square
 _LEAST_ROOM = 1 / 64  # beside an axis, in the unit square
+KEPT = {"holes": ("holes",), "parts": ("parts",), "all": ("holes", "parts")}  # what may be asked to be kept
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +33,7 @@ class Guidance:
     earlier: ConstructionSequence | None = None  # what led to `start`, if it was given
     locked: frozenset[int] = frozenset()  # ids of vertices that stay, and stay where they are
     axis: float | None = None  # x of the axis about which the outline is symmetric
+    keep: tuple[str, ...] = ()  # "holes", "parts": each of the picture's is to be one of the mesh's, whatever it costs
 
     @classmethod
     def of(
@@ -37,6 +42,7 @@ class Guidance:
         start: PolyMesh | ConstructionSequence | None,
         locked: Collection[int],
         symmetry: bool | float | None,
+        keep: str | None = None,
     ) -> "Guidance":
         """See `Simulator` for the arguments. Raises ConfigError for what is impossible or contradicts itself."""
         earlier, mesh = (start, start.final()) if isinstance(start, ConstructionSequence) else (None, start)
@@ -44,7 +50,9 @@ class Guidance:
             _check_start(mesh)
         _check_locked(mesh, locked)
         axis = None if symmetry is None or symmetry is False else _axis(silhouette, symmetry)
-        guidance = cls(mesh, earlier, frozenset(map(int, locked)), axis)
+        if keep is not None and keep not in KEPT:
+            raise ConfigError(f"keep {keep!r}: expected one of {', '.join(KEPT)}")
+        guidance = cls(mesh, earlier, frozenset(map(int, locked)), axis, () if keep is None else KEPT[keep])
         if mesh is not None and axis is not None:
             guidance.check_symmetric(mesh)
             _check_images_locked(mesh, guidance.locked, axis)
@@ -52,7 +60,7 @@ class Guidance:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The wishes there are: some of start, locked and symmetry."""
+        """The wishes that only agents which play step by step can heed: some of start, locked and symmetry."""
         wishes = {"start": self.start is not None, "locked": bool(self.locked), "symmetry": self.axis is not None}
         return tuple(name for name, is_given in wishes.items() if is_given)
 
@@ -67,6 +75,8 @@ class Guidance:
             values["locked"] = sorted(self.locked)
         if self.axis is not None:
             values["symmetry"] = self.axis
+        if self.keep:
+            values["keep"] = ",".join(self.keep)
         return values
 
     def bonds(self, mesh: PolyMesh) -> Bonds | None:
@@ -131,6 +141,9 @@ def _check_start(mesh: PolyMesh) -> None:
     if not isinstance(mesh, PolyMesh):
         kind = type(mesh).__name__
         raise ConfigError(f"the start is a {kind}; expected a PolyMesh or a ConstructionSequence")
+    n_corners = sum(map(len, mesh.faces))
+    if n_corners > MOST_CORNERS:
+        raise ConfigError(f"the start mesh has {n_corners} corners: expected at most {MOST_CORNERS}")
     try:
         validate(mesh)
     except MeshError as error:
@@ -141,12 +154,16 @@ def _check_start(mesh: PolyMesh) -> None:
         raise ConfigError(f"vertex {name} of the start mesh is at ({x:g}, {y:g}), outside the unit square: scale it in")
     crossings, flipped = defects_of(mesh)
     if crossings:
-        raise ConfigError(f"the start mesh has {crossings} pairs of edges that cross or touch: pull them apart")
+        raise ConfigError(
+            f"the start mesh has {crossings} pairs of edges that cross or (nearly) touch: pull them apart"
+        )
     if flipped:
         raise ConfigError(f"the start mesh has {flipped} flipped or empty faces: turn them over or leave them out")
 
 
 def _check_locked(mesh: PolyMesh | None, locked: Collection[int]) -> None:
+    if not isinstance(locked, Collection) or not all(isinstance(name, int | np.integer) for name in locked):
+        raise ConfigError(f"locked={short(locked)}: expected ids of vertices, such as (0, 3)")
     if not locked:
         return
     if mesh is None:
@@ -158,7 +175,7 @@ def _check_locked(mesh: PolyMesh | None, locked: Collection[int]) -> None:
 
 
 def _axis(silhouette: Silhouette, symmetry: bool | float) -> float:
-    axis = best_axis(silhouette) if symmetry is True else float(symmetry)
+    axis = best_axis(silhouette) if symmetry is True else number("symmetry", symmetry)
     if not _LEAST_ROOM <= axis <= 1.0 - _LEAST_ROOM:
         raise ConfigError(f"symmetry about x = {axis:g}: expected an axis well inside the unit square, such as 0.5")
     return axis

@@ -1,15 +1,17 @@
-"""Numba kernels for the plane geometry of meshes: signed face areas and pairs of edges that intersect."""
+"""Numba kernels for the plane geometry of meshes: signed face areas, pairs of edges that meet or nearly meet."""
 
 import numpy as np
 
-from autopoly_env.arrays import FloatArray, IntArray
+from autopoly_env.arrays import BoolArray, FloatArray, IntArray
 from autopoly_env.compute import kernel
+from autopoly_env.mesh.planar_kernels import segments_near
 
 # Forward error bound of the 2x2 orientation determinant (Shewchuk 1997, "Adaptive precision floating-point
 # arithmetic and fast robust geometric predicates", ccwerrboundA).
 _ORIENTATION_ERROR = (3.0 + 16.0 * 2.0**-53) * 2.0**-53
 UNCERTAIN = 2
 _MIN_FACE_AREA = 1e-9  # unit square; a face of less counts as empty
+CLEARANCE = 4e-4  # unit square, a tenth of a pixel at 256 x 256; edges of the boundary that come closer are a hairline
 
 
 @kernel
@@ -85,11 +87,36 @@ def face_areas(points: FloatArray, corners: IntArray, offsets: IntArray) -> Floa
 
 
 @kernel
-def defects(points: FloatArray, edges: IntArray, corners: IntArray, offsets: IntArray) -> tuple[int, int]:
-    """(crossings, flipped or empty faces) of a mesh; a crossing that rounding decides counts."""
+def count_hairlines(points: FloatArray, edges: IntArray, on_rim: BoolArray, gap: float) -> int:
+    """Pairs of boundary edges (`on_rim` (E,)) that share no vertex, do not meet, and come closer than `gap`."""
+    n_pairs = 0
+    for i in range(edges.shape[0]):
+        if not on_rim[i]:
+            continue
+        a, b = edges[i, 0], edges[i, 1]
+        low_x, high_x = min(points[a, 0], points[b, 0]) - gap, max(points[a, 0], points[b, 0]) + gap
+        low_y, high_y = min(points[a, 1], points[b, 1]) - gap, max(points[a, 1], points[b, 1]) + gap
+        for j in range(i):
+            c, d = edges[j, 0], edges[j, 1]
+            if not on_rim[j] or a == c or a == d or b == c or b == d:
+                continue
+            cx, cy, dx, dy = points[c, 0], points[c, 1], points[d, 0], points[d, 1]
+            if max(cx, dx) < low_x or min(cx, dx) > high_x or max(cy, dy) < low_y or min(cy, dy) > high_y:
+                continue
+            near = segments_near(points[a, 0], points[a, 1], points[b, 0], points[b, 1], cx, cy, dx, dy, gap)
+            if near and _segments_meet(points, a, b, c, d) == 0:
+                n_pairs += 1
+    return n_pairs
+
+
+@kernel
+def defects(
+    points: FloatArray, edges: IntArray, on_rim: BoolArray, corners: IntArray, offsets: IntArray
+) -> tuple[int, int]:
+    """(crossings and hairlines, flipped or empty faces) of a mesh; a crossing that rounding decides counts."""
     certain, uncertain = count_crossings(points, edges)
     flipped = 0
     for area in face_areas(points, corners, offsets):
         if not area > _MIN_FACE_AREA:
             flipped += 1
-    return certain + uncertain, flipped
+    return certain + uncertain + count_hairlines(points, edges, on_rim, CLEARANCE), flipped

@@ -19,33 +19,46 @@ def cross(ox: float, oy: float, ax: float, ay: float, bx: float, by: float) -> f
 
 
 @kernel
-def point_on_segment(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> bool:
+def _point_near_segment(px: float, py: float, ax: float, ay: float, bx: float, by: float, gap: float) -> bool:
     dx, dy = bx - ax, by - ay
     length2 = dx * dx + dy * dy
     t = 0.0
     if length2 > 0.0:
         t = min(1.0, max(0.0, ((px - ax) * dx + (py - ay) * dy) / length2))
     ex, ey = ax + t * dx - px, ay + t * dy - py
-    return bool(ex * ex + ey * ey <= TOUCH * TOUCH)
+    return bool(ex * ex + ey * ey <= gap * gap)
 
 
 @kernel
-def segments_touch(px: float, py: float, qx: float, qy: float, ax: float, ay: float, bx: float, by: float) -> bool:
-    """Whether the closed segments pq and ab come within `TOUCH` of each other."""
-    if max(px, qx) + TOUCH < min(ax, bx) or max(ax, bx) + TOUCH < min(px, qx):
+def point_on_segment(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> bool:
+    return _point_near_segment(px, py, ax, ay, bx, by, TOUCH)
+
+
+@kernel
+def segments_near(
+    px: float, py: float, qx: float, qy: float, ax: float, ay: float, bx: float, by: float, gap: float
+) -> bool:
+    """Whether the closed segments pq and ab come within `gap` of each other."""
+    if max(px, qx) + gap < min(ax, bx) or max(ax, bx) + gap < min(px, qx):
         return False
-    if max(py, qy) + TOUCH < min(ay, by) or max(ay, by) + TOUCH < min(py, qy):
+    if max(py, qy) + gap < min(ay, by) or max(ay, by) + gap < min(py, qy):
         return False
     a_side, b_side = cross(px, py, qx, qy, ax, ay), cross(px, py, qx, qy, bx, by)
     p_side, q_side = cross(ax, ay, bx, by, px, py), cross(ax, ay, bx, by, qx, qy)
     if (a_side > 0.0) != (b_side > 0.0) and (p_side > 0.0) != (q_side > 0.0):
         return True
     return bool(
-        point_on_segment(px, py, ax, ay, bx, by)
-        or point_on_segment(qx, qy, ax, ay, bx, by)
-        or point_on_segment(ax, ay, px, py, qx, qy)
-        or point_on_segment(bx, by, px, py, qx, qy)
+        _point_near_segment(px, py, ax, ay, bx, by, gap)
+        or _point_near_segment(qx, qy, ax, ay, bx, by, gap)
+        or _point_near_segment(ax, ay, px, py, qx, qy, gap)
+        or _point_near_segment(bx, by, px, py, qx, qy, gap)
     )
+
+
+@kernel
+def segments_touch(px: float, py: float, qx: float, qy: float, ax: float, ay: float, bx: float, by: float) -> bool:
+    """Whether the closed segments pq and ab come within `TOUCH` of each other."""
+    return segments_near(px, py, qx, qy, ax, ay, bx, by, TOUCH)
 
 
 @kernel
@@ -93,7 +106,8 @@ def arc_area(ring: FloatArray, i: int, j: int) -> float:
 
 
 @kernel
-def _is_free_diagonal(ring: FloatArray, face: IntArray, edges: IntArray, i: int, j: int) -> bool:
+def is_free_diagonal(ring: FloatArray, face: IntArray, edges: IntArray, i: int, j: int) -> bool:
+    """Whether corners i and j of a face are joined by a line strictly inside it that is no edge (E,2) of the mesh."""
     n = len(ring)
     if i == j or (i + 1) % n == j or (j + 1) % n == i:
         return False
@@ -136,7 +150,7 @@ def splittable_corners(vertices: FloatArray, corners: IntArray, offsets: IntArra
                 if mask[start + i]:
                     break
                 j = (i + step) % n
-                if _is_free_diagonal(ring, face, edges, i, j):
+                if is_free_diagonal(ring, face, edges, i, j):
                     mask[start + i] = mask[start + j] = True
     return mask
 
@@ -147,7 +161,7 @@ def split_imbalance(vertices: FloatArray, face: IntArray, edges: IntArray, i: in
     ring = ring_of(vertices, face)
     imbalance = np.full(len(face), np.inf)
     for j in range(len(face)):
-        if _is_free_diagonal(ring, face, edges, i, j):
+        if is_free_diagonal(ring, face, edges, i, j):
             imbalance[j] = abs(arc_area(ring, i, j) - arc_area(ring, j, i))
     return imbalance
 

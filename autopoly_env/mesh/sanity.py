@@ -1,4 +1,4 @@
-"""What is wrong with a mesh that is valid all the same: edges that cross, faces flipped, empty or not allowed."""
+"""What is wrong with a valid mesh all the same: edges that cross, hairlines, faces flipped, empty or not allowed."""
 
 from autopoly_env.mesh import geometry_kernels
 from autopoly_env.mesh.face_rule import FaceRule, broken_faces
@@ -6,14 +6,18 @@ from autopoly_env.mesh.polymesh import PolyMesh
 
 
 def defects_of(mesh: PolyMesh, faces: FaceRule = "any") -> tuple[int, int]:
-    """(crossings, faces that are flipped or empty plus those that break the rule) as the refit counts them."""
+    """(crossings and hairlines, faces that are flipped, empty or against the rule) as the refit counts them.
+
+    A hairline is a pair of boundary edges that share no vertex and come closer than `CLEARANCE` without meeting: a
+    corridor or a slit that shows in no picture, or two vertices as good as in one place.
+    """
     topology = mesh.topology
     crossings, flipped = geometry_kernels.defects(
-        mesh.vertices, topology.edges, topology.corners, topology.face_offsets
+        mesh.vertices, topology.edges, topology.is_boundary_edge, topology.corners, topology.face_offsets
     )
     return int(crossings), int(flipped) + len(broken_faces(mesh, faces))
 
 
 def is_sane(mesh: PolyMesh, faces: FaceRule = "any") -> bool:
-    """Whether no edges cross and no face is flipped, empty or against the rule."""
+    """Whether no edges cross, there are no hairlines, and no face is flipped, empty or against the rule."""
     return defects_of(mesh, faces) == (0, 0)

@@ -7,13 +7,14 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
-from autopoly_env.arguments import first_defect, shortened
+from autopoly_env.arguments import first_defect
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import SequenceError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators.action import Choice
 from autopoly_env.operators.elements import EDGE, corner_position, hole_face
 from autopoly_env.operators.holes import HoleChoice
+from autopoly_env.shown import short
 
 ChoiceIds = dict[str, Any]
 
@@ -37,14 +38,15 @@ class ChoiceCodec:
 
 
 _Id = Annotated[int, Field(strict=True, ge=0)]
-_Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+_FARTHEST = 1e6  # unit square, as of vertices
+_Place = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-_FARTHEST, le=_FARTHEST)]
 
 
 @dataclass(frozen=True)
 class _Hole:
     __pydantic_config__ = ConfigDict(extra="forbid")
 
-    points: tuple[tuple[_Number, _Number], ...]
+    points: tuple[tuple[_Place, _Place], ...]
     bridges: tuple[tuple[_Id, _Id], tuple[_Id, _Id]]
 
 
@@ -58,10 +60,10 @@ def _corner_choice_ids(mesh: PolyMesh, _corner: int, choice: Choice) -> ChoiceId
 
 def _corner_choice(mesh: PolyMesh, corner: int, ids: ChoiceIds) -> Choice:
     if ids.keys() != {"to"}:
-        raise SequenceError(f"choice {ids}: expected the vertex to split to, {{'to': id}}")
+        raise SequenceError(f"choice {short(ids)}: expected the vertex to split to, {{'to': id}}")
     to = ids["to"]
     if isinstance(to, bool) or not isinstance(to, int) or to < 0:
-        raise SequenceError(f"choice.to is {shortened(to)}; give an id, an integer from 0")
+        raise SequenceError(f"choice.to is {short(to)}; give an id, an integer from 0")
     links = mesh.topology.links
     face = links.faces[corner]
     return links.offsets[face] + corner_position(mesh, face, to)
@@ -76,7 +78,7 @@ def _vertex_choice(mesh: PolyMesh, _vertex: int, ids: ChoiceIds) -> Choice:
     match ids:
         case {"to": int(to), **rest} if not rest and not isinstance(to, bool):
             return mesh.vertex_index(to)
-    raise SequenceError(f"choice {shortened(ids)}: expected the vertex to merge with, {{'to': id}}")
+    raise SequenceError(f"choice {short(ids)}: expected the vertex to merge with, {{'to': id}}")
 
 
 def _edge_choice_ids(mesh: PolyMesh, _edge: int, choice: Choice) -> ChoiceIds:
@@ -88,7 +90,7 @@ def _edge_choice(mesh: PolyMesh, _edge: int, ids: ChoiceIds) -> Choice:
     match ids:
         case {"to": [int(a), int(b)], **rest} if not rest and not isinstance(a, bool) and not isinstance(b, bool):
             return EDGE.index(mesh, {"edge": [a, b]})
-    raise SequenceError(f"choice {shortened(ids)}: expected the ends of the edge to fill to, {{'to': [id, id]}}")
+    raise SequenceError(f"choice {short(ids)}: expected the ends of the edge to fill to, {{'to': [id, id]}}")
 
 
 def _renamed_edge(ids: ChoiceIds, renaming: Renaming) -> ChoiceIds:
@@ -107,7 +109,7 @@ def _slide(mesh: PolyMesh, edge: int, ids: ChoiceIds) -> Choice:
             if end in ends:
                 return slide if end == ends[0] else 1.0 - slide
     raise SequenceError(
-        f"choice {shortened(ids)}: expected an end of the edge and how far from it, {{'from': id, 'slide': 0.5}}"
+        f"choice {short(ids)}: expected an end of the edge and how far from it, {{'from': id, 'slide': 0.5}}"
     )
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from autopoly_env.errors import SequenceError
 from autopoly_env.mesh import PolyMesh
+from autopoly_env.shown import short
 
 ElementIds = dict[str, int | list[int]]  # {"edge": [3, 7]}, {"face": 0, "vertex": 2}, ...: what JSON knows
 HOLE_SIDES = (3, 4)
@@ -58,7 +59,7 @@ def corner_position(mesh: PolyMesh, face: int, vertex_id: int) -> int:
 
 def no_such_element(kind: str, element: object) -> SequenceError:
     """The error for ids that name no element of a kind."""
-    return SequenceError(f"element {element} is not of kind {kind}; see docs/sequence-format.md")
+    return SequenceError(f"element {short(element)} is not of kind {kind}; see docs/sequence-format.md")
 
 
 def _edge_ids(mesh: PolyMesh, edge: int) -> ElementIds:

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from autopoly_env.arrays import BoolArray, FloatArray
-from autopoly_env.mesh import PolyMesh
-from autopoly_env.mesh.planar_kernels import split_imbalance, splittable_corners
+from autopoly_env.mesh import Face, PolyMesh
+from autopoly_env.mesh.planar_kernels import is_free_diagonal, split_imbalance, splittable_corners
 from autopoly_env.operators.action import Choice
 from autopoly_env.operators.choices import TO_CORNER
 from autopoly_env.operators.elements import CORNER
@@ -26,6 +26,11 @@ def _costs(mesh: PolyMesh, corner: int) -> FloatArray:
     face, i = corner_of(mesh, corner)
     costs: FloatArray = split_imbalance(mesh.vertices, np.array(mesh.faces[face]), mesh.edges, i)
     return costs
+
+
+def _is_free(mesh: PolyMesh, face: Face, i: int, j: int) -> bool:
+    """Of one diagonal, for a replay knows which one it was: all of them would be the square of the corners' number."""
+    return bool(is_free_diagonal(mesh.vertices[list(face)], np.array(face), mesh.edges, i, j))
 
 
 def most_even_diagonal(mesh: PolyMesh, corner: int) -> int | None:
@@ -49,7 +54,7 @@ def split(mesh: PolyMesh, corner: int, choice: Choice | None) -> PolyMesh:
         raise refusal("face_split", "corner", corner, f"{choice!r} is no corner; give the corner to split to")
     f, i = corner_of(mesh, corner)
     face, j = mesh.faces[f], int(choice) - mesh.topology.links.offsets[f]
-    if not 0 <= j < len(face) or _costs(mesh, corner)[j] == np.inf:
+    if not 0 <= j < len(face) or not _is_free(mesh, face, i, j):
         raise refusal(
             "face_split",
             "corner",

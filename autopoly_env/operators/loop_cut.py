@@ -213,7 +213,7 @@ loop_cut = Operator(
         ),
         "Edge › Loop Cut and Slide",
         "mesh.loopcut_slide",
-        lambda _: Gesture("KKPBBPBB", n_selected=0),
+        lambda _: Gesture("KKPBBPBB"),
     ),
     blender=_blender,
 )

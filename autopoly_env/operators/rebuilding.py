@@ -73,18 +73,20 @@ def ends_along_face(mesh: PolyMesh, edge: int) -> tuple[int, int]:
     return links.tails[half_edge], links.heads[half_edge]
 
 
-def rim_defect(mesh: PolyMesh, rim: Iterable[tuple[int, int]]) -> str:
-    """Why boundary half-edges, of those in `rim` that are there, cannot get faces that hang together; or nothing.
+def rim_defect(mesh: PolyMesh, sides: Iterable[tuple[int, int]]) -> str:
+    """Why the boundary half-edges among `sides` cannot all get faces that hang together; empty if they can.
 
     Of each part of the mesh they have to lie on one boundary loop: to join two makes a handle, which no mesh in the
-    plane has, and V - E + F would not be components - holes any more.
+    plane has, and V - E + F would not be components - holes any more. Where all sides are on the boundary, some of it
+    has to be left.
     """
-    topology = mesh.topology
+    topology, asked = mesh.topology, set(sides)
     rows = dict(zip(map(tuple, topology.boundary_half_edges.tolist()), topology.boundary_labels.tolist(), strict=True))
-    found = [tuple(rows[pair]) for pair in set(rim) if pair in rows]
-    if len(set(found)) > len({part for _, part in found}):
+    loops = [tuple(rows[pair]) for pair in asked if pair in rows]
+    parts = {part for _, part in loops}
+    if len(set(loops)) > len(parts):
         return "it would join two boundaries of one part, as a handle does"
-    if any(len(found) == sum(part == other for _, other in rows.values()) for part in {part for _, part in found}):
+    if len(loops) == len(asked) == sum(part in parts for _, part in rows.values()):
         return "no boundary would be left"
     return ""
 

@@ -17,6 +17,7 @@ from autopoly_env.operators.loop_cut import loop_cut
 from autopoly_env.operators.operator import Operator
 from autopoly_env.operators.vertex_dissolve import vertex_dissolve
 from autopoly_env.operators.vertex_merge import vertex_merge
+from autopoly_env.shown import short
 
 _PAPER = (edge_subdivide, edge_extrude, face_split, face_delete)
 _FULL = (*_PAPER, face_hole, vertex_dissolve, edge_dissolve)
@@ -57,6 +58,8 @@ def preset(given: str | Iterable[str | Operator]) -> tuple[Operator, ...]:
 
     Those of one's own are registered. Raises ConfigError for what is none of these, and an operator named twice.
     """
+    if not isinstance(given, Iterable):
+        raise ConfigError(f"operators {short(given)}: expected a preset, names, or a list of names and Operators")
     parts = [part.strip() for part in given.split(",")] if isinstance(given, str) else list(given)
     found: list[Operator] = []
     for part in parts:
@@ -72,15 +75,15 @@ def _asked_for(part: str | Operator) -> tuple[Operator, ...]:
     if isinstance(part, Operator):
         return (register(part),)
     if not isinstance(part, str):
-        raise ConfigError(f"operator {part!r}: expected a name or an Operator")
+        raise ConfigError(f"operator {short(part)}: expected a name or an Operator")
     if part in PRESETS:
         return PRESETS[part]
     if ":" in part:
         return (register(_imported(part)),)
     if part not in OPERATORS:
         raise ConfigError(
-            f"operators {part!r} are unknown; give some of {', '.join((*PRESETS, *OPERATORS))} with commas between "
-            "them, or one of your own as my.module:my_operator"
+            f"operators {short(part)} are unknown; give some of {', '.join((*PRESETS, *OPERATORS))} with commas "
+            "between them, or one of your own as my.module:my_operator"
         )
     return (OPERATORS[part],)
 

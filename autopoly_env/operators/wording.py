@@ -5,6 +5,9 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from autopoly_env.errors import ConfigError
+from autopoly_env.shown import told
+
+_MOST_WORDS = 80  # letters that name an element
 
 EDGES, FACES, VERTICES = "`2`", "`3`", "`1`"  # Blender's select modes
 
@@ -63,7 +66,7 @@ def element_words(step: Told) -> str:
     words = {
         key: "–".join(map(str, value)) if isinstance(value, list) else value for key, value in step.element.items()
     }
-    return ", ".join(f"{key} {value}" for key, value in words.items())
+    return told(", ".join(f"{key} {value}" for key, value in words.items()), _MOST_WORDS)
 
 
 def begun_with(step: Told) -> str:

@@ -48,6 +48,7 @@ class Pixels(NamedTuple):
     mask: BoolArray  # (R, R)
     mask_sum: IntArray | FloatArray  # (R, R+1) prefix sums of it along the rows, of the weights if there are any
     weight_sum: FloatArray | None = None  # (R, R+1)
+    by_area: bool = False  # whether a pixel counts by the share of it that is covered, and not as covered by half
 
 
 AREA, COVER, HEAD = 0, 1, 2  # HEAD is 1 + the cell's first piece, 0 for none
@@ -218,8 +219,19 @@ def span_weight(row: int, first: int, last: int, weight_sum: FloatArray | None) 
 
 
 @kernel
+def _share(covered: float, by_area: bool) -> float:
+    """What a pixel with this coverage counts."""
+    if by_area:
+        return min(max(covered, 0.0), 1.0)
+    return 1.0 if covered >= 0.5 else 0.0
+
+
+@kernel
 def overlap_counts(points: FloatArray, edges: IntArray, pixels: Pixels, work: Workspace) -> tuple[float, float]:
-    """Pixels with coverage >= 0.5: (those inside the target mask, all of them); weighed where pixels have weights."""
+    """Pixels with coverage >= 0.5: (those inside the target mask, all of them); weighed where pixels have weights.
+
+    Where the pixels count by area, the areas that are covered: (inside the target mask, all).
+    """
     return overlap_counts_in_rows(points, edges, pixels, work, 0, pixels.mask.shape[0])
 
 
@@ -228,11 +240,11 @@ def overlap_counts_in_rows(
     points: FloatArray, edges: IntArray, pixels: Pixels, work: Workspace, first_row: int, last_row: int
 ) -> tuple[float, float]:
     """`overlap_counts` of rows first_row..last_row-1 alone, at the cost of what lies in them."""
-    mask, mask_sum, weight_sum = pixels
+    mask, mask_sum, weight_sum, by_area = pixels
     size = mask.shape[0]
     walk_boundary(points, edges, size, work, first_row, last_row)
     words = (size + 63) >> 6
-    inside, filled = 0, 0
+    inside, filled = 0.0, 0.0
     for row in range(first_row, last_row):
         total = 0.0
         column = 0
@@ -243,20 +255,23 @@ def overlap_counts_in_rows(
                 here = word * 64 + int(trailing_zeros(bits))
                 bits &= bits - np.uint64(1)
                 cell = row * (size + PADDING) + here
-                if total >= 0.5:
-                    filled += span_weight(row, column, here, weight_sum)
-                    inside += mask_sum[row, here] - mask_sum[row, column]
-                if total + work.cells[cell, AREA] >= 0.5:
-                    weight = span_weight(row, here, here + 1, weight_sum)
+                share = _share(total, by_area)
+                if share > 0.0:
+                    filled += share * span_weight(row, column, here, weight_sum)
+                    inside += share * (mask_sum[row, here] - mask_sum[row, column])
+                share = _share(total + work.cells[cell, AREA], by_area)
+                if share > 0.0:
+                    weight = share * span_weight(row, here, here + 1, weight_sum)
                     filled += weight
                     if mask[row, here]:
                         inside += weight
                 total += work.cells[cell, COVER]
                 column = here + 1
                 clear(cell, work)
-        if total >= 0.5:
-            filled += span_weight(row, column, size, weight_sum)
-            inside += mask_sum[row, size] - mask_sum[row, column]
+        share = _share(total, by_area)
+        if share > 0.0:
+            filled += share * span_weight(row, column, size, weight_sum)
+            inside += share * (mask_sum[row, size] - mask_sum[row, column])
     return inside, filled
 
 

@@ -64,7 +64,7 @@ def picture_of(target: Target) -> Picture:
 
 def pixels_of(target: Target) -> Pixels:
     """The target as the kernels that count pixels read it."""
-    return Pixels(target.mask, target.mask_sum, target.weight_sum)
+    return Pixels(target.mask, target.mask_sum, target.weight_sum, target.by_area)
 
 
 def loss_and_gradient(mesh: PolyMesh, target: Target) -> tuple[float, FloatArray]:

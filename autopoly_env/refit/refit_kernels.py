@@ -48,7 +48,7 @@ def refit(
             unknowns[k, axis] = start[v, axis]
             low, high = min(low, start[v, axis]), max(high, start[v, axis])
     fine = pyramid[len(pyramid) - 1]
-    crossings, flipped = defects(start, shape.edges, shape.corners, shape.offsets)
+    crossings, flipped = defects(start, shape.edges, shape.on_rim, shape.corners, shape.offsets)
     best = Progress(start, start.copy(), np.empty_like(start), np.zeros(6))
     best.record[MOST_CROSSINGS] = 1e9 if settings.keep_defects else crossings
     best.record[MOST_FLIPPED] = 1e9 if settings.keep_defects else flipped

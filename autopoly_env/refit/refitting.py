@@ -187,6 +187,7 @@ def shape_of(topology: Topology) -> Shape:
         boundary=boundary,
         loops=np.ascontiguousarray(unknown[directed]),
         edges=topology.edges,
+        on_rim=topology.is_boundary_edge,
         corners=topology.corners,
         offsets=topology.face_offsets,
         inner=inner,

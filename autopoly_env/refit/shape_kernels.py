@@ -33,6 +33,7 @@ class Shape(NamedTuple):
     boundary: IntArray  # (N,) vertex of each unknown
     loops: IntArray  # (B, 2) directed boundary edges between unknowns
     edges: IntArray  # (E, 2) between vertices
+    on_rim: BoolArray  # (E,) whether an edge is the boundary's
     corners: IntArray  # (H,) vertices of all faces, one face after the other
     offsets: IntArray  # (F+1,) where each face starts in `corners`
     inner: IntArray  # (K,) vertices that are not on the boundary
@@ -158,7 +159,7 @@ def spread(unknowns: FloatArray, shape: Shape, best: Progress) -> None:
 def offer(unknowns: FloatArray, shape: Shape, loss: float, best: Progress) -> bool:
     """Keep the mesh if it is sane and its loss is the least so far; say whether it is sane."""
     spread(unknowns, shape, best)
-    crossings, flipped = defects(best.trial, shape.edges, shape.corners, shape.offsets)
+    crossings, flipped = defects(best.trial, shape.edges, shape.on_rim, shape.corners, shape.offsets)
     sane = crossings <= best.record[MOST_CROSSINGS] and flipped <= best.record[MOST_FLIPPED]
     sane = sane and keeps_rule(shape, best.trial, best.start)
     if sane and loss < best.record[LOSS]:

@@ -8,19 +8,24 @@ from typing import Annotated, Any, NoReturn
 import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, TypeAdapter, ValidationError
 
-from autopoly_env.arguments import first_defect, shortened
+from autopoly_env.arguments import first_defect
 from autopoly_env.errors import MeshError, SequenceError
 from autopoly_env.mesh import PolyMesh, Topology, validate
+from autopoly_env.shown import short
 
 FORMAT = "autopoly-construction-sequence"
 VERSION = 2  # of sequences whose steps say which part they work on; all others are written as version 1
 VERSIONS = (1, VERSION)
 MOST_LABEL = 60  # characters
+MOST_BYTES = 16_000_000  # of a text
+MOST_CORNERS = 20_000  # of a mesh: what looks for crossings takes time by their square
+FARTHEST = 1e6  # unit square, of a coordinate: farther out nothing can be computed with
 SCORE_KEYS = ("iou", "complexity", "self_intersections", "total")
 
-Id = Annotated[int, Field(strict=True, ge=0)]
+Id = Annotated[int, Field(strict=True, ge=0, le=2**53)]  # as far as every reader of JSON counts exactly
+Coordinate = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-FARTHEST, le=FARTHEST)]
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Score = dict[str, Annotated[int, Field(strict=True)] | Number]  # at least SCORE_KEYS
+PlainScore = dict[str, Annotated[int, Field(strict=True, ge=-(2**53), le=2**53)] | Number]  # at least SCORE_KEYS
 _STRICT = ConfigDict(extra="forbid")
 
 
@@ -51,8 +56,8 @@ class Step:
     choice: dict[str, Any] | None
     created: dict[str, list[Id]]  # {"vertices": [...], "faces": [...]}
     removed: dict[str, list[Id]]
-    moved: tuple[tuple[Id, Number, Number], ...]  # (vertex, x, y) wherever the operator itself had put it elsewhere
-    score: Score
+    moved: tuple[tuple[Id, Coordinate, Coordinate], ...]  # (vertex, x, y) where the operator itself put it elsewhere
+    score: PlainScore
     part: Label | None = None
 
 
@@ -60,11 +65,11 @@ class Step:
 class _Start:
     __pydantic_config__ = _STRICT
 
-    vertices: list[tuple[Id, Number, Number]]
+    vertices: list[tuple[Id, Coordinate, Coordinate]]
     faces: list[tuple[Id, list[Id]]]
     next_vertex_id: Id
     next_face_id: Id
-    score: Score
+    score: PlainScore
 
 
 @dataclass(frozen=True)
@@ -72,7 +77,7 @@ class _Document:
     __pydantic_config__ = _STRICT
 
     format: str
-    version: int
+    version: Annotated[int, Field(strict=True)]
     settings: dict[str, Any]
     start: _Start
     steps: tuple[Step, ...]
@@ -81,7 +86,7 @@ class _Document:
 _DOCUMENT = TypeAdapter(_Document)
 
 
-def dump_json(settings: dict[str, Any], start: PolyMesh, start_score: Score, steps: tuple[Step, ...]) -> str:
+def dump_json(settings: dict[str, Any], start: PolyMesh, start_score: PlainScore, steps: tuple[Step, ...]) -> str:
     """The text of a sequence, a step a line. Raises SequenceError for what JSON has not, such as NaN."""
     ids = start.vertex_ids
     start_document = _Start(
@@ -97,17 +102,19 @@ def dump_json(settings: dict[str, Any], start: PolyMesh, start_score: Score, ste
     return f'{head},\n "start": {plain_json(asdict(start_document))},\n "steps": [\n  {lines}]}}\n'
 
 
-def parse_json(text: str) -> tuple[dict[str, Any], PolyMesh, Score, tuple[Step, ...]]:
+def parse_json(text: str) -> tuple[dict[str, Any], PolyMesh, PlainScore, tuple[Step, ...]]:
     """Settings, start mesh, its score and the steps of a text. Raises SequenceError if it is no sequence."""
+    if len(text) > MOST_BYTES:
+        raise SequenceError(f"the text has {len(text)} letters; expected at most {MOST_BYTES}")
     try:
         data = json.loads(text, parse_constant=_refuse_number, parse_float=_finite)
     except (ValueError, RecursionError) as error:
         raise SequenceError(f"not JSON ({_one_line(error)}); give a construction sequence as saved") from None
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         found = data.get("format") if isinstance(data, dict) else data
-        raise SequenceError(f"the format is {shortened(found)}, not {FORMAT!r}; give a construction sequence")
-    if data.get("version") not in VERSIONS:
-        raise SequenceError(f"the version is {shortened(data.get('version'))}; this release reads versions 1 and 2")
+        raise SequenceError(f"the format is {short(found)}, not {FORMAT!r}; give a construction sequence")
+    if data.get("version") not in VERSIONS or type(data["version"]) is not int:
+        raise SequenceError(f"the version is {short(data.get('version'))}; this release reads versions 1 and 2")
     try:
         document = _DOCUMENT.validate_python(data)
     except ValidationError as error:
@@ -118,11 +125,16 @@ def parse_json(text: str) -> tuple[dict[str, Any], PolyMesh, Score, tuple[Step, 
     return document.settings, _start_mesh(document.start), document.start.score, document.steps
 
 
-def check_score(score: Score, where: str) -> None:
-    """Raise SequenceError if an entry of SCORE_KEYS is missing."""
+def check_score(score: PlainScore, where: str) -> None:
+    """Raise SequenceError if an entry of SCORE_KEYS is missing, or out of its range."""
     missing = [key for key in SCORE_KEYS if key not in score]
     if missing:
         raise SequenceError(f"{where}: the score has no {missing[0]!r}; give {', '.join(SCORE_KEYS)}")
+    if not 0.0 <= score["iou"] <= 1.0:
+        raise SequenceError(f"{where}: the score's iou is {score['iou']}; expected 0 to 1")
+    for key in ("complexity", "self_intersections"):
+        if not score[key] >= 0 or score[key] != int(score[key]):
+            raise SequenceError(f"{where}: the score's {key} is {score[key]}; expected a whole number from 0")
 
 
 def plain_json(value: object) -> str:
@@ -149,6 +161,9 @@ def _plain_number(value: object) -> int | float | bool:
 
 
 def _start_mesh(start: _Start) -> PolyMesh:
+    n_corners = sum(len(names) for _, names in start.faces)
+    if n_corners > MOST_CORNERS:
+        raise SequenceError(f"start: its faces have {n_corners} corners; expected at most {MOST_CORNERS}")
     index = {name: v for v, (name, _, _) in enumerate(start.vertices)}
     unknown = [(face, v) for face, names in start.faces for v in names if v not in index]
     if unknown:

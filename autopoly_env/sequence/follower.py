@@ -21,7 +21,7 @@ from autopoly_env.sequence.ids import choice_indices, decoded
 
 _ALIKE = 0.5  # share of the corners of two faces, of old and new, that they need to have in common to be one
 
-Place = Callable[[FloatArray], FloatArray]  # where points (P, 2) of an old mesh go
+PointMap = Callable[[FloatArray], FloatArray]  # where points (P, 2) of an old mesh go
 Taken = tuple[Action, Choice | None, PolyMesh]
 
 
@@ -33,8 +33,8 @@ class Standing(NamedTuple):
     mesh: PolyMesh
 
 
-EndRule = Callable[[Standing, PolyMesh, int, int], int]  # (.., old mesh before a step, an edge's end, its other) -> id
-FaceRule = Callable[[Standing, PolyMesh, int], int]  # (.., old mesh before a step, an old face) -> id in the new mesh
+EndChoice = Callable[[Standing, PolyMesh, int, int], int]  # (.., old mesh before a step, an end, its other) -> id
+FaceChoice = Callable[[Standing, PolyMesh, int], int]  # (.., old mesh before a step, an old face) -> id in the new mesh
 
 
 def end_on_boundary(standing: Standing, before: PolyMesh, end: int, other: int) -> int:
@@ -73,8 +73,8 @@ class Follower:
         mesh: PolyMesh,
         *,
         is_mirrored: bool = False,
-        end_rule: EndRule = end_on_boundary,
-        face_rule: FaceRule = face_most_alike,
+        end_rule: EndChoice = end_on_boundary,
+        face_rule: FaceChoice = face_most_alike,
     ) -> None:
         """`mesh` has the vertices of `old` under the same ids; with `is_mirrored` its faces are wound the other way."""
         self.mesh = mesh
@@ -88,7 +88,7 @@ class Follower:
         """Of every old vertex that is there, its id in the new construction."""
         return self._standing.names
 
-    def take(self, step: Step, before: PolyMesh, after: PolyMesh, place: Place, *, is_moving: bool = True) -> Taken:
+    def take(self, step: Step, before: PolyMesh, after: PolyMesh, place: PointMap, *, is_moving: bool = True) -> Taken:
         """Take a step that once led from `before` to `after`; every vertex goes where `place` takes its old position.
 
         Vertices without an old position stay; all do, where it is not `is_moving`. Raises an AutoPolyError, and takes
@@ -141,12 +141,12 @@ class Follower:
             raise _gone("vertex", name)
         return self.names[name]
 
-    def _choice(self, operator: Operator, step: Step, place: Place) -> dict[str, Any] | None:
+    def _choice(self, operator: Operator, step: Step, place: PointMap) -> dict[str, Any] | None:
         if step.choice is None or operator.choice is None:
             return step.choice
         return operator.choice.renamed(step.choice, Renaming(self._vertex, place, self._is_mirrored))
 
-    def _placed(self, made: PolyMesh, after: PolyMesh, place: Place) -> PolyMesh:
+    def _placed(self, made: PolyMesh, after: PolyMesh, place: PointMap) -> PolyMesh:
         present, names = set(made.vertex_ids), self.names
         places = zip(after.vertex_ids, place(after.vertices).tolist(), strict=True)
         named = {names.get(name, -1): (x, y) for name, (x, y) in places}

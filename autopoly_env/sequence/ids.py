@@ -7,6 +7,7 @@ from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import Choice, Operator
 from autopoly_env.operators import operator_named as registered
 from autopoly_env.sequence.file import Step
+from autopoly_env.shown import short
 
 
 def choice_ids(mesh: PolyMesh, operator: Operator, element: int, choice: Choice | None) -> dict[str, Any] | None:
@@ -14,7 +15,7 @@ def choice_ids(mesh: PolyMesh, operator: Operator, element: int, choice: Choice 
     if choice is None:
         return None
     if operator.choice is None:
-        raise SequenceError(f"choice {choice!r}: {operator.name} leaves nothing to choose")
+        raise SequenceError(f"choice {short(choice)}: {operator.name} leaves nothing to choose")
     return operator.choice.ids(mesh, element, choice)
 
 
@@ -24,7 +25,7 @@ def choice_indices(mesh: PolyMesh, operator: Operator, element: int, choice: dic
         return operator.choice.indices(mesh, element, choice)
     if choice is None and operator.choice is None:
         return None
-    raise SequenceError(f"choice {choice} is not one of {operator.name}; see docs/sequence-format.md")
+    raise SequenceError(f"choice {short(choice)} is not one of {operator.name}; see docs/sequence-format.md")
 
 
 def decoded(mesh: PolyMesh, step: Step) -> tuple[Operator, int, Choice | None]:

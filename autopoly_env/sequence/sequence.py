@@ -2,25 +2,37 @@
 
 import json
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from autopoly_env.errors import AutoPolyError, ConfigError, MeshError, SequenceError
-from autopoly_env.files import write_atomically
-from autopoly_env.mesh import FaceRule, PolyMesh, check_faces, face_rule
+from autopoly_env.files import read_text, write_atomically
+from autopoly_env.mesh import FaceRule, PolyMesh, Topology, check_faces, face_rule
 from autopoly_env.operators import STOP, Action, Choice
 from autopoly_env.operators.wording import element_words
 from autopoly_env.sequence import variation
-from autopoly_env.sequence.file import Score, Step, check_label, check_score, dump_json, parse_json, plain_json
-from autopoly_env.sequence.follower import Place
+from autopoly_env.sequence.file import (
+    MOST_BYTES,
+    MOST_CORNERS,
+    PlainScore,
+    Step,
+    check_label,
+    check_score,
+    dump_json,
+    parse_json,
+    plain_json,
+)
+from autopoly_env.sequence.follower import PointMap
 from autopoly_env.sequence.ids import choice_ids, decoded, operator_named
+from autopoly_env.shown import told
 
 __all__ = ["ConstructionSequence", "Step"]
+
+MOST_WORK = 10_000_000  # corners of all meshes of a construction: about 20 seconds, and 300 MB where all are kept
 
 
 @dataclass(frozen=True)
@@ -29,7 +41,7 @@ class ConstructionSequence:
 
     settings: dict[str, Any]  # anything JSON knows: what a reader needs in order to understand the scores
     start: PolyMesh
-    start_score: Score
+    start_score: PlainScore
     steps: tuple[Step, ...] = ()
 
     @classmethod
@@ -37,8 +49,8 @@ class ConstructionSequence:
         cls,
         settings: dict[str, Any],
         start: PolyMesh,
-        start_score: Score,
-        transitions: Iterable[tuple[Action, Choice | None, PolyMesh, Score]],
+        start_score: PlainScore,
+        transitions: Iterable[tuple[Action, Choice | None, PolyMesh, PlainScore]],
     ) -> "ConstructionSequence":
         """The sequence of `transitions` (action, its choice, the mesh after it, that mesh's score) from `start`.
 
@@ -86,30 +98,54 @@ class ConstructionSequence:
         """Raise SequenceError naming the first mesh that breaks the rule of faces."""
         if self.faces == "any":
             return
-        for number, mesh in enumerate(self.meshes()):
+        for number, mesh in enumerate(self.replayed()):
             try:
                 check_faces(mesh, self.faces, "the start mesh" if number == 0 else f"the mesh after step {number}")
             except MeshError as error:
                 raise SequenceError(str(error)) from None
 
-    @cached_property
-    def _meshes(self) -> tuple[PolyMesh, ...]:
-        meshes = [self.start]
+    def replayed(self) -> Iterator[PolyMesh]:
+        """The start mesh and the mesh after each step, one at a time: no more than two are in memory at once.
+
+        Raises SequenceError naming the step that fails, or with which it becomes too much: `MOST_CORNERS` in a mesh,
+        `MOST_WORK` in all.
+        """
+        mesh, work = self.start, 0
+        yield mesh
         for number, step in enumerate(self.steps, 1):
             try:
-                meshes.append(_replay_step(meshes[-1], step))
+                made = _replay_step(mesh, step)
+                n_corners = len(made.topology.links.tails)
+                work += n_corners
+                if n_corners > MOST_CORNERS or work > MOST_WORK:
+                    raise SequenceError(
+                        f"the mesh has {n_corners} corners, {work} with those before it; expected at most "
+                        f"{MOST_CORNERS} and {MOST_WORK}: give a shorter construction"
+                    )
             except AutoPolyError as error:
-                where = f"step {number}, {step.operator} {element_words(step)}"
+                where = f"step {number}, {told(step.operator, 40)} {element_words(step)}"
                 raise SequenceError(f"{where}: {error}") from None
-        return tuple(meshes)
+            mesh = made
+            yield _bare(mesh)
+
+    @cached_property
+    def _meshes(self) -> tuple[PolyMesh, ...]:
+        return tuple(self.replayed())
+
+    @cached_property
+    def _final(self) -> PolyMesh:
+        last = self.start
+        for mesh in self.replayed():
+            last = mesh
+        return last
 
     def meshes(self) -> list[PolyMesh]:
-        """The start mesh and the mesh after each step. Raises SequenceError naming the step that fails."""
+        """All of `replayed`, kept."""
         return list(self._meshes)
 
     def final(self) -> PolyMesh:
         """The mesh after the last step."""
-        return self._meshes[-1]
+        return self._final
 
     def trim(self, n: int) -> "ConstructionSequence":
         """The first n steps. Raises SequenceError if there are not as many."""
@@ -168,7 +204,7 @@ class ConstructionSequence:
         steps = (replace(step, part=label) for step, label in zip(self.steps, labels, strict=True))
         return replace(self, steps=tuple(steps))
 
-    def moved_by(self, place: Callable[[int], Place]) -> "ConstructionSequence":
+    def moved_by(self, place: Callable[[int], PointMap]) -> "ConstructionSequence":
         """The same steps, the points of mesh number i (0 is the start) going where `place(i)` takes them.
 
         Raises SequenceError naming the step that is illegal then.
@@ -218,7 +254,7 @@ class ConstructionSequence:
         the rule of faces that its settings name.
         """
         sequence = cls(*parse_json(text))
-        sequence.meshes()
+        sequence.final()
         sequence._check_faces()
         return sequence
 
@@ -236,17 +272,18 @@ class ConstructionSequence:
     def load(cls, path: str | os.PathLike[str]) -> "ConstructionSequence":
         """The sequence in a file. Raises SequenceError as `from_json` does, or if it cannot be read."""
         try:
-            text = Path(path).read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
-            raise SequenceError(f"cannot read {path} ({reason}); give a construction sequence as saved") from None
+            text = read_text(path, MOST_BYTES)
+        except OSError as error:
+            raise SequenceError(
+                f"cannot read {path} ({error.strerror}); give a construction sequence as saved"
+            ) from None
         try:
             return cls.from_json(text)
         except SequenceError as error:
             raise SequenceError(f"{path}: {error}") from None
 
 
-def _record_step(mesh: PolyMesh, action: Action, choice: Choice | None, after: PolyMesh, score: Score) -> Step:
+def _record_step(mesh: PolyMesh, action: Action, choice: Choice | None, after: PolyMesh, score: PlainScore) -> Step:
     operator, element = operator_named(action.operator), int(action.element)
     if choice is None:
         choice = operator.choice_at(mesh, element)
@@ -284,6 +321,11 @@ def _replay_step(mesh: PolyMesh, step: Step) -> PolyMesh:
     for name, x, y in step.moved:
         vertices[made.vertex_index(name)] = x, y
     return made.with_vertices(vertices)
+
+
+def _bare(mesh: PolyMesh) -> PolyMesh:
+    """The mesh without what was derived from its topology on the way, which is twenty times as large."""
+    return replace(mesh, topology=Topology(mesh.topology.n_vertices, mesh.faces))
 
 
 def _id_changes(before: PolyMesh, after: PolyMesh) -> tuple[dict[str, list[int]], dict[str, list[int]]]:

@@ -11,22 +11,23 @@ No target is at hand: the meshes are scored against the picture of the last one,
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
-
-import numpy as np
 
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import AutoPolyError, SequenceError
 from autopoly_env.mesh import PolyMesh
+from autopoly_env.mesh import mirrored as mirrored_points
 from autopoly_env.operators import Action, Choice
 from autopoly_env.operators.wording import element_words
 from autopoly_env.raster import coverage
 from autopoly_env.score import ScoreWeights, score
 from autopoly_env.sequence.deformation import ThinPlate
-from autopoly_env.sequence.file import Score, Step
-from autopoly_env.sequence.follower import Follower, Place, Taken, mirror_image, moved_to
+from autopoly_env.sequence.file import PlainScore, Step
+from autopoly_env.sequence.follower import Follower, PointMap, Taken, mirror_image, moved_to
 from autopoly_env.silhouette import Silhouette
 
+_MOST_WEIGHT = 1e9  # that settings may tell; they are of any content
 RESOLUTION = 256  # of the picture of the last mesh
 
 Positions = Mapping[int, tuple[float, float]]  # by vertex id, in the unit square
@@ -45,8 +46,8 @@ class Recording(NamedTuple):
 
     settings: dict[str, Any]
     start: PolyMesh
-    start_score: Score
-    transitions: list[tuple[Action, Choice | None, PolyMesh, Score]]
+    start_score: PlainScore
+    transitions: list[tuple[Action, Choice | None, PolyMesh, PlainScore]]
 
 
 def with_changes(old: Replayed, k: int, moved: Positions, choice: Mapping[str, Any] | None) -> Recording:
@@ -98,7 +99,7 @@ def without(old: Replayed, k: int) -> Recording:
     return _rescored(old.settings, meshes[0], taken)
 
 
-def moved_by(old: Replayed, place: Callable[[int], Place]) -> Recording:
+def moved_by(old: Replayed, place: Callable[[int], PointMap]) -> Recording:
     """The same steps, mesh number i moved by `place(i)`. Raises SequenceError naming the step that is illegal then."""
     meshes = old.meshes
     start = meshes[0].with_vertices(place(0)(meshes[0].vertices))
@@ -114,8 +115,9 @@ def mirrored(old: Replayed) -> Recording:
     meshes = old.meshes
     follower = Follower(meshes[0], mirror_image(meshes[0]), is_mirrored=True)
     start = follower.mesh
+    image = partial(mirrored_points, axis=0.5)
     taken = [
-        _told(i, step, follower.take, step, meshes[i - 1], meshes[i], _mirrored) for i, step in enumerate(old.steps, 1)
+        _told(i, step, follower.take, step, meshes[i - 1], meshes[i], image) for i, step in enumerate(old.steps, 1)
     ]
     return _rescored(old.settings, start, taken)
 
@@ -149,8 +151,9 @@ def weights_of(settings: Mapping[str, Any]) -> ScoreWeights:
     """The weights under which a sequence was scored; the default for those that its settings do not tell."""
     default = ScoreWeights()
     told = {name: settings.get(name, value) for name, value in vars(default).items()}
-    is_plain = all(isinstance(v, int | float) and np.isfinite(v) and v >= 0.0 for v in told.values())
-    return ScoreWeights(**told) if is_plain else default
+    if all(type(value) in (int, float) and 0.0 <= value <= _MOST_WEIGHT for value in told.values()):
+        return ScoreWeights(**told)
+    return default
 
 
 def _chosen_anew(before: PolyMesh, after: PolyMesh, step: Step, k: int, choice: Mapping[str, Any] | None) -> PolyMesh:
@@ -178,8 +181,3 @@ def _told(number: int, step: Step, take: Callable[..., Taken], *arguments: objec
 def stay(points: FloatArray) -> FloatArray:
     """Where points go that do not move."""
     return points
-
-
-def _mirrored(points: FloatArray) -> FloatArray:
-    mirrored: FloatArray = points * (-1.0, 1.0) + (1.0, 0.0)
-    return mirrored

@@ -1,8 +1,8 @@
-"""Reading images: any source becomes a small grey picture (and its opacity), however large it was."""
+"""Reading images: any source becomes a picture of at most MAX_SIDE pixels a side, or several, one for each frame."""
 
 import os
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,17 +11,25 @@ from typing import IO
 import numpy as np
 from PIL import Image, UnidentifiedImageError
 
-from autopoly_env.arrays import AnyArray, Float32Array
+from autopoly_env.arrays import AnyArray, ByteArray, Float32Array
 from autopoly_env.errors import SilhouetteError
+from autopoly_env.silhouette import svg
+from autopoly_env.silhouette.layers import (
+    DEEP_MODES,
+    Layers,
+    array_layers,
+    is_coloured,
+    pillow_layers,
+    reduced,
+    righted,
+    stretched,
+)
 
 ImageSource = str | os.PathLike[str] | IO[bytes] | Image.Image | AnyArray
 
-MAX_SIDE = 2048  # pixels; longer pictures are reduced by an integer factor
 MAX_PIXELS = 500_000_000  # larger pictures are refused
-STRIP_PIXELS = 2**20  # pixels converted at a time, so that a huge picture never exists twice
+MAX_FRAMES = 100  # that are looked at, of an animation
 ROUNDING = 1e-6  # a float image may leave 0..1 by this much
-LUMA = np.array([0.299, 0.587, 0.114], dtype=np.float32)  # ITU-R BT.601, as Pillow's mode "L"
-DEEP_MODES = ("I", "F", "I;16", "I;16B", "I;16L", "I;16N")  # more than 8 bits a pixel
 EXIF_ORIENTATION = 0x0112
 # EXIF orientation -> what rights the picture: (transpose, then reverse rows, then reverse columns)
 RIGHTING = {
@@ -41,22 +49,36 @@ _pillow_lock = threading.Lock()
 class Picture:
     """What was read from a source, before anything decides which part of it is the object.
 
-    `grey` (H, W) float32 in 0..1, None for a boolean array. `opacity` (H, W) float32 in 0..1: the alpha
-    channel where there is one, and a boolean array itself. `label` names the source in errors.
+    `grey` (H, W) float32 in 0..1, None for a boolean array. `colour` (H, W, 3) uint8, sRGB, None where all is grey.
+    `opacity` (H, W) float32 in 0..1: the alpha channel where there is one, and a boolean array itself. `label` names
+    the source in errors.
     """
 
     grey: Float32Array | None
+    colour: ByteArray | None
     opacity: Float32Array | None
     name: str
     label: str
     notes: tuple[str, ...]
 
+    @property
+    def is_flat(self) -> bool:
+        """Whether all of it has one colour."""
+        shown = self.grey if self.colour is None else self.colour
+        return shown is None or bool((shown == shown[0, 0]).all())
+
 
 def read_picture(source: ImageSource) -> Picture:
+    """The picture, or the first frame, of a path, binary file object, PIL image or array; see `read_frames`."""
+    return next(iter(read_frames(source)))
+
+
+def read_frames(source: ImageSource) -> Iterator[Picture]:
     """Read a path, binary file object, PIL image or array; at most MAX_SIDE pixels a side come back.
 
-    Arrays are (H, W) or (H, W, 1 to 4: grey, grey + alpha, RGB, RGBA), uint8 or float in 0..1; boolean ones
-    (H, W).
+    Frames of an animation and pages of a file come one after the other, the first MAX_FRAMES of them. SVG is drawn,
+    with the extra `svg`. Arrays are (H, W) or (H, W, 1 to 4: grey, grey + alpha, RGB, RGBA), uint8 or float in 0..1;
+    boolean ones (H, W).
 
     Raises SilhouetteError when there is no such file, when it is no complete image or larger than MAX_PIXELS,
     and for arrays of another shape, dtype or range.
@@ -66,9 +88,9 @@ def read_picture(source: ImageSource) -> Picture:
     if isinstance(source, Image.Image):
         given_name = getattr(source, "filename", "")
         name = Path(given_name).stem if isinstance(given_name, (str, os.PathLike)) else ""
-        return _read_pillow(source, name or "silhouette", "the given image")
+        return iter([_read_pillow(source, name or "silhouette", "the given image")])
     if isinstance(source, np.ndarray):
-        return _read_array(source)
+        return iter([_read_array(source)])
     if hasattr(source, "read"):
         given_name = getattr(source, "name", None)
         name = Path(given_name).stem if isinstance(given_name, str) else "silhouette"
@@ -77,7 +99,7 @@ def read_picture(source: ImageSource) -> Picture:
     raise SilhouetteError(f"cannot load a {kind}; expected a path, a binary file object, a PIL image or a numpy array")
 
 
-def _read_path(path: Path) -> Picture:
+def _read_path(path: Path) -> Iterator[Picture]:
     label = repr(str(path))
     if os.path.isdir(path):
         raise SilhouetteError(f"{label} is a directory; expected one image file: name a file in it")
@@ -88,22 +110,39 @@ def _read_path(path: Path) -> Picture:
     except (OSError, ValueError) as error:
         raise SilhouetteError(f"{label} cannot be opened ({_reason(error)}); expected a readable image file") from error
     with stream:
-        return _read_stream(stream, path.stem, label)
+        yield from _read_stream(stream, path.stem, label)
 
 
-def _read_stream(stream: IO[bytes], name: str, label: str) -> Picture:
+def _read_stream(stream: IO[bytes], name: str, label: str) -> Iterator[Picture]:
     try:
         with _pillow_limit(None):  # the size is checked below, with our own limit and message
-            image = Image.open(stream)
+            image: Image.Image = Image.open(stream)
     except UnidentifiedImageError as error:
-        advice = "expected PNG, JPEG, WebP, BMP, GIF or TIFF: export it as PNG"
-        raise SilhouetteError(f"{label} is not an image that can be read; {advice}") from error
+        drawing = svg.read(stream, label)
+        if drawing is None:
+            advice = "expected a picture, such as PNG, JPEG, WebP, BMP, GIF, TIFF or SVG: export it as PNG"
+            raise SilhouetteError(f"{label} is not an image that can be read; {advice}") from error
+        image = drawing
     except Exception as error:  # a damaged header makes Pillow's readers raise almost anything
         raise _undecodable(label, error) from error
-    return _read_pillow(image, name, label)
+    yield _read_pillow(image, name, label)
+    for number in range(1, min(_n_frames(image), MAX_FRAMES)):
+        try:
+            image.seek(number)
+        except Exception:  # cut short: what came before is whole
+            return
+        yield _read_pillow(image, name, label)
+
+
+def _n_frames(image: Image.Image) -> int:
+    try:
+        return int(getattr(image, "n_frames", 1))
+    except Exception:  # counting reads the file to its end, which may be missing
+        return 1
 
 
 def _read_pillow(image: Image.Image, name: str, label: str) -> Picture:
+    """The frame that the image stands at."""
     width, height = image.size
     if width * height > MAX_PIXELS:
         limit = f"expected at most {MAX_PIXELS // 10**6} megapixels: scale it down first"
@@ -114,18 +153,19 @@ def _read_pillow(image: Image.Image, name: str, label: str) -> Picture:
         with _pillow_limit(MAX_PIXELS):
             animated = getattr(image, "is_animated", False)
             image.load()
-        levels, notes = _reduced(lambda top, end: _pillow_levels(image, top, end), width, height)
+        layers, notes = reduced(lambda top, end: pillow_layers(image, top, end), width, height)
         orientation = image.getexif().get(EXIF_ORIENTATION, 1)
     except Exception as error:  # as above
         raise _undecodable(label, error) from error
     if animated:
-        notes.insert(0, "first frame of several")
+        number = image.tell()
+        notes.insert(0, f"frame {number + 1}, the first that shows something" if number else "first frame of several")
     if image.mode in DEEP_MODES:
-        levels = _stretched(levels, label, notes)
+        layers["grey"] = stretched(layers["grey"], label, notes)
     if orientation in RIGHTING:
-        levels = _righted(levels, *RIGHTING[orientation])
+        layers = {key: righted(layer, *RIGHTING[orientation]) for key, layer in layers.items()}
         notes.append(f"turned upright (EXIF orientation {orientation})")
-    return Picture(levels[0], levels[1] if len(levels) == 2 else None, name, label, tuple(notes))
+    return _picture(layers, name, label, notes)
 
 
 def _read_array(array: AnyArray) -> Picture:
@@ -146,78 +186,17 @@ def _read_array(array: AnyArray) -> Picture:
             raise SilhouetteError(f"{label} holds NaN or infinity; expected finite values: replace them")
         if low < -ROUNDING or high > 1 + ROUNDING:
             raise SilhouetteError(f"{label} spans {low:g}..{high:g}; expected floats in 0..1: rescale it")
-    levels, notes = _reduced(lambda top, end: _array_levels(array[top:end]), width, height)
-    grey = None if is_mask else levels[0]
-    opacity = levels[0] if is_mask else levels[1] if len(levels) == 2 else None
-    return Picture(grey, opacity, "silhouette", label, tuple(notes))
+    layers, notes = reduced(lambda top, end: array_layers(array[top:end]), width, height)
+    if is_mask:
+        return Picture(None, None, layers["grey"], "silhouette", label, tuple(notes))
+    return _picture(layers, "silhouette", label, notes)
 
 
-def _array_levels(array: AnyArray) -> Float32Array:
-    """Grey (and alpha) of some rows of an array: (1 or 2, rows, W) float32 in 0..1."""
-    levels = array.astype(np.float32) / np.float32(255 if array.dtype == np.uint8 else 1)
-    if levels.ndim == 2:
-        return levels[None]
-    n_colours = levels.shape[2] - (levels.shape[2] in (2, 4))
-    grey = levels[..., :3] @ LUMA if n_colours == 3 else levels[..., 0]
-    return np.stack([grey, *np.moveaxis(levels[..., n_colours:], 2, 0)])
-
-
-def _pillow_levels(image: Image.Image, top: int, end: int) -> Float32Array:
-    """Grey (and alpha) of rows top..end of a loaded image: (1 or 2, rows, W) float32, in 0..1 unless it is
-    deep."""
-    strip = image.crop((0, top, image.width, end))
-    if strip.mode in DEEP_MODES:
-        return np.asarray(strip, dtype=np.float32)[None]
-    if strip.has_transparency_data:
-        strip = strip.convert("RGBA")
-        bands = [strip.convert("L"), strip.getchannel("A")]
-    else:
-        bands = [strip.getchannel("L") if strip.mode == "LAB" else strip.convert("L")]
-    return np.stack([np.asarray(band, dtype=np.float32) for band in bands]) / np.float32(255)
-
-
-def _reduced(
-    levels_of_rows: Callable[[int, int], Float32Array], width: int, height: int
-) -> tuple[Float32Array, list[str]]:
-    """Read strip by strip and average blocks of factor x factor pixels: (C, H, W) with sides <= MAX_SIDE,
-    notes."""
-    factor = -(-max(width, height) // MAX_SIDE)
-    rows = factor * max(1, STRIP_PIXELS // (width * factor))
-    strips = [_block_means(levels_of_rows(top, min(top + rows, height)), factor) for top in range(0, height, rows)]
-    levels = np.concatenate(strips, axis=1)
-    if factor == 1:
-        return levels, []
-    size = f"{levels.shape[2]}x{levels.shape[1]}"
-    return levels, [f"reduced from {width}x{height} to {size} (blocks of {factor}x{factor} averaged)"]
-
-
-def _block_means(levels: Float32Array, factor: int) -> Float32Array:
-    """Means over factor x factor blocks of (C, H, W); the last row and column of blocks may be smaller."""
-    if factor == 1:
-        return levels
-    for axis in (1, 2):
-        starts = np.arange(0, levels.shape[axis], factor)
-        counts = np.diff(starts, append=levels.shape[axis]).astype(np.float32)
-        levels = np.add.reduceat(levels, starts, axis=axis)
-        levels /= counts[:, None] if axis == 1 else counts
-    return levels
-
-
-def _stretched(levels: Float32Array, label: str, notes: list[str]) -> Float32Array:
-    """Levels of unknown range, scaled so that they span 0..1."""
-    low, high = float(levels.min()), float(levels.max())
-    if not np.isfinite(high - low):
-        raise SilhouetteError(f"{label} holds NaN or infinity; expected finite levels: replace them")
-    if low == high or (low, high) == (0, 1):
-        return levels
-    notes.append(f"levels {low:g}..{high:g} scaled to 0..1")
-    return (levels - np.float32(low)) / np.float32(high - low)
-
-
-def _righted(levels: Float32Array, transpose: bool, reverse_rows: bool, reverse_columns: bool) -> Float32Array:
-    if transpose:
-        levels = levels.swapaxes(1, 2)
-    return levels[:, :: -1 if reverse_rows else 1, :: -1 if reverse_columns else 1]
+def _picture(layers: Layers, name: str, label: str, notes: list[str]) -> Picture:
+    colour = layers.get("colour")
+    if colour is not None and not is_coloured(colour):
+        colour = None
+    return Picture(layers["grey"], colour, layers.get("opacity"), name, label, tuple(notes))
 
 
 @contextmanager

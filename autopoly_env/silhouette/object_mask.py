@@ -1,159 +1,190 @@
-"""Which pixels of a picture are the object: alpha or Otsu with a border vote, then cleaning and squaring."""
+"""Which pixels of a picture are the object: alpha, colour and lightness are asked, the best supported believed."""
 
 import numpy as np
 
-from autopoly_env.arrays import AnyArray, BoolArray, Float32Array, IntArray
+from autopoly_env.arrays import BoolArray
 from autopoly_env.errors import SilhouetteError
+from autopoly_env.silhouette import by_colour, by_lightness
+from autopoly_env.silhouette.alpha import Alpha, read_alpha
+from autopoly_env.silhouette.background import NO_FRAME, Frame, border, find_frame
+from autopoly_env.silhouette.colours import hex_of
+from autopoly_env.silhouette.inside_out import righted
 from autopoly_env.silhouette.loading import Picture
+from autopoly_env.silhouette.opinion import Opinion, View, disagreement, view_of
+from autopoly_env.silhouette.options import DEFAULT_OPTIONS, ObjectOptions
 
-OPAQUE = 0.5  # alpha from here on (128 of 255) is the object
-# A level is unclear when it is further than FAR of the distance between the class means from both of them; a
-# picture with more than MAX_UNCLEAR of such pixels is called a photo. Measured: antialiased icons from 16 px
-# <= 8 %, outlines blurred by 1 % of the side <= 3 %, JPEG at quality 5 <= 1 %; three photos in four > 13 %.
-FAR, MAX_UNCLEAR = 0.25, 0.10
-MIN_COMPONENT_PIXELS, MIN_COMPONENT_SHARE = 4, 2e-5  # smaller components are specks, smaller holes pinholes
+AGREED = 0.03  # of the object: opinions that differ by less are one
+TRUSTED = 0.6  # support from which the colour of the border is believed to be that of the background
+ADVICE = "expected an object that differs from its background"
+TILE = 0.8  # of its extent: what is opaque is a tile, on which something may be drawn
+NOISE_LEVELS, NOISE_SIDE, NOISE_BAND = 3, 24, (0.85, 1.15)  # see `_is_noise`
 
 
-def find_object(picture: Picture) -> tuple[BoolArray, list[str]]:
+def find_object(picture: Picture, options: ObjectOptions = DEFAULT_OPTIONS) -> tuple[BoolArray, list[str]]:
     """The (H, W) mask of the object, and notes on how it was told from the background.
 
-    Alpha decides where it really varies: the object is what is opaque. Otherwise Otsu's threshold splits the
-    grey levels, and the class that most border pixels belong to is the background (a tie: the lighter one).
+    Alpha decides where a real share of the picture is clear. Otherwise the object is what differs in colour from the
+    background, which most of the border shows, or one side of Otsu's threshold of grey levels: where the two disagree,
+    the better supported one is taken, and a note says so. `options` overrule all of that.
 
-    Raises SilhouetteError when the picture has one level only.
+    Raises SilhouetteError where there is no object, and where the picture has not what the options ask for.
     """
-    grey, opacity = picture.grey, picture.opacity
-    if opacity is not None:
-        opaque = opacity >= OPAQUE
-        if opaque.any() and not opaque.all():
-            return opaque, [] if grey is None else ["object is what alpha shows as opaque (128 or more)"]
-        if grey is None:
-            raise _no_object(picture, f"is {bool(opaque[0, 0])} everywhere")
-        if not opaque.any():
-            raise _no_object(picture, "is transparent everywhere")
-    assert grey is not None
-    low, high = float(grey.min()), float(grey.max())
-    if low == high:
-        shade = {0.0: "black", 1.0: "white"}.get(low, f"at grey level {low:g}")
-        raise _no_object(picture, f"is {shade} everywhere")
-    return _split_by_grey(grey)
+    if picture.grey is None:
+        return _given_mask(picture, options)
+    alpha = read_alpha(picture, options)
+    asked_otherwise = options.object not in ("auto", "alpha") or options.background or options.threshold is not None
+    if alpha is not None and (options.object == "alpha" or options.alpha_threshold is not None) and not asked_otherwise:
+        return alpha.opaque, list(alpha.notes)
+    if alpha is not None and alpha.decides and not asked_otherwise:
+        return alpha.opaque, [*alpha.notes, *_inner_notes(picture, alpha)]
+    view = _view_of(picture, alpha)
+    _check_varied(picture, view, alpha)
+    found = _asked(picture, view, options) if asked_otherwise else _best(picture, view, alpha)
+    mask = found.mask if alpha is None else found.mask & alpha.opaque
+    if not mask.any() or (alpha is None and mask.all()):
+        which = "everywhere" if mask.any() else "nowhere"
+        raise SilhouetteError(
+            f"{picture.label}: {found.notes[0]}, which is {which} in it; {ADVICE}: change that option"
+        )
+    return mask, list(found.notes)
+
+
+def _given_mask(picture: Picture, options: ObjectOptions) -> tuple[BoolArray, list[str]]:
+    assert picture.opacity is not None
+    mask: BoolArray = picture.opacity >= 0.5
+    if options.object != "auto" or options.background or options.threshold or options.alpha_threshold:
+        raise SilhouetteError(f"{picture.label} says itself what is object; leave out the options that look for it")
+    if mask.all() or not mask.any():
+        raise _no_object(picture, f"is {bool(mask[0, 0])} everywhere")
+    return mask, []
 
 
 def _no_object(picture: Picture, finding: str) -> SilhouetteError:
-    advice = "expected an object that differs from its background"
-    return SilhouetteError(f"{picture.label} {finding}: there is no object; {advice}: give another image")
+    return SilhouetteError(f"{picture.label} {finding}: there is no object; {ADVICE}: give another image")
 
 
-def _split_by_grey(grey: Float32Array) -> tuple[BoolArray, list[str]]:
-    from skimage.filters import threshold_otsu  # here, because scikit-image is slow to import
-
-    threshold = float(threshold_otsu(grey))
-    light = grey > threshold
-    background_is_light = bool(_border(light).mean() >= 0.5)
-    # the same split, written as the middle of the gap between the two classes
-    threshold = 0.5 * (float(grey[~light].max()) + float(grey[light].min()))
-    notes = [
-        f"threshold {threshold:.2f} (Otsu)",
-        f"object is {'darker' if background_is_light else 'lighter'} than the background",
-    ]
-    unclear = _unclear_share(grey, light)
-    if unclear > MAX_UNCLEAR:
-        notes.append(f"warning: more than two clear levels ({unclear:.0%} of the pixels fit neither): is it a photo?")
-    return light != background_is_light, notes
+def _view_of(picture: Picture, alpha: Alpha | None) -> View:
+    """The picture's levels; clear pixels look like the opaque ones around them, for nobody sees their own colour."""
+    grey, colour = picture.grey, picture.colour
+    assert grey is not None
+    if alpha is not None and alpha.opaque.any() and not alpha.opaque.all():
+        rim = _rim(alpha.opaque)
+        grey = np.where(alpha.opaque, grey, np.median(grey[rim])).astype(np.float32)
+        if colour is not None:
+            paint = np.median(colour[rim], axis=0).astype(np.uint8)
+            colour = np.where(alpha.opaque[..., None], colour, paint)
+    return view_of(grey, colour)
 
 
-def _unclear_share(grey: Float32Array, light: BoolArray) -> float:
-    """The share of pixels whose level is far from the means of both classes.
+def _rim(opaque: BoolArray) -> BoolArray:
+    """The opaque pixels beside clear ones and along the picture's border."""
+    from scipy.ndimage import binary_erosion
 
-    Pixels beside one of the other class do not count: an antialiased outline makes them, and in small icons
-    they are many.
-    """
-    dark_mean, light_mean = float(grey[~light].mean()), float(grey[light].mean())
-    distance = np.minimum(np.abs(grey - dark_mean), np.abs(grey - light_mean))
-    unclear = distance > FAR * (light_mean - dark_mean)
-    across, down = light[:, 1:] != light[:, :-1], light[1:] != light[:-1]
-    for one_side, other_side, change in (
-        (unclear[:, 1:], unclear[:, :-1], across),
-        (unclear[1:], unclear[:-1], down),
-    ):
-        one_side[change] = other_side[change] = False
-    return float(unclear.mean())
+    rim: BoolArray = opaque & ~binary_erosion(opaque, np.ones((3, 3), dtype=bool))
+    return rim
 
 
-def clean(mask: BoolArray, min_component: int | None) -> tuple[BoolArray, list[str]]:
-    """Drop specks and fill pinholes of fewer than `min_component` pixels, unless nothing else would be left.
-
-    The default is max(4, 2e-5 of the image's area). Object pixels are joined over corners too (8 neighbours),
-    those of the background over sides (4).
-    """
-    if min_component is None:
-        min_component = max(MIN_COMPONENT_PIXELS, round(MIN_COMPONENT_SHARE * mask.size))
-    notes = []
-    specks, n_specks = _smaller_than(min_component, _parts(mask))
-    if n_specks and (specks != mask).any():
-        mask = mask & ~specks
-        notes.append(f"{_counted(n_specks, 'speck')} of less than {min_component} pixels dropped")
-    pinholes, n_pinholes = _smaller_than(min_component, _holes(mask))
-    if n_pinholes and (pinholes == mask).any():
-        mask = mask | pinholes
-        notes.append(f"{_counted(n_pinholes, 'pinhole')} of less than {min_component} pixels filled")
-    return mask, notes
+def _check_varied(picture: Picture, view: View, alpha: Alpha | None) -> None:
+    """Raise SilhouetteError for a picture of one colour and for one in which every pixel differs from the next."""
+    first = view.features[0, 0]
+    if (view.features[::16, ::16] == first).all() and (view.features == first).all():
+        assert picture.grey is not None
+        low = float(picture.grey[0, 0] if alpha is None else picture.grey[alpha.opaque].min(initial=1.0))
+        shade = {0.0: "black", 1.0: "white"}.get(low, f"at grey level {low:g}")
+        where = "everywhere" if alpha is None else "wherever it is opaque"
+        raise _no_object(picture, f"is {shade if view.is_grey else hex_of(view.features[0, 0])} {where}")
+    if _is_noise(view):
+        tried = "alpha, colour and lightness were tried"
+        raise SilhouetteError(
+            f"{picture.label} is noise, every pixel differs from the next; {tried}: give another image"
+        )
 
 
-def describe(mask: BoolArray) -> list[str]:
-    """Notes on what a user may not expect of a mask: several parts, holes, the image's border touched."""
-    n_parts, n_holes = int(_parts(mask).max()), int(_holes(mask).max())
-    notes = []
-    if n_parts > 1:
-        notes.append(f"object has {n_parts} separate parts")
-    if n_holes:
-        notes.append(f"object has {_counted(n_holes, 'hole')}")
-    if _border(mask).any():
-        notes.append("object touches the border of the image")
-    return notes
+def _is_noise(view: View) -> bool:
+    """Whether neighbours are as unlike as any two pixels: the mean square of their difference is twice the variance."""
+    if min(view.levels.shape) < NOISE_SIDE:
+        return False
+    sample = view.features[:512, :512, 0]
+    if len(np.unique(view.levels[:512:4, :512:4])) <= NOISE_LEVELS:
+        return False
+    variance = float(sample.var())
+    unlike = [float(np.square(np.diff(sample, axis=axis)).mean()) / max(2 * variance, 1e-12) for axis in (0, 1)]
+    return all(NOISE_BAND[0] < ratio < NOISE_BAND[1] for ratio in unlike)
 
 
-def square(mask: BoolArray) -> tuple[BoolArray, list[str]]:
-    """The mask in the middle of a square of background, as large as its longer side."""
-    height, width = mask.shape
-    side = max(height, width)
-    if height == width:
-        return mask, []
-    above, left = (side - height) // 2, (side - width) // 2
-    padded = np.pad(mask, ((above, side - height - above), (left, side - width - left)))
-    return padded, [f"padded from {width}x{height} to {side}x{side}"]
+def _asked(picture: Picture, view: View, options: ObjectOptions) -> Opinion:
+    """The object that the options describe."""
+    if options.background is not None or options.object_colour is not None:
+        return by_colour.asked(picture.label, view, options)
+    frame = find_frame(view.features) if options.object == "auto" else NO_FRAME
+    found = by_lightness.split(view.within(frame), options.object, options.threshold)
+    return _reframed(found, view.levels.shape, frame)
 
 
-def _parts(mask: BoolArray) -> IntArray:
-    """Component labels (H, W) of the object, 1.., 0 elsewhere; 8 neighbours."""
-    from skimage.measure import label
-
-    labels: IntArray = label(mask, connectivity=2)
-    return labels
-
-
-def _holes(mask: BoolArray) -> IntArray:
-    """Labels (H, W) of background that does not reach the border, 1.., 0 elsewhere; 4 neighbours."""
-    from skimage.measure import label
-
-    labels: IntArray = label(~mask, connectivity=1)
-    enclosed = np.ones(labels.max() + 1, dtype=bool)
-    enclosed[0] = False
-    enclosed[_border(labels)] = False
-    numbers: IntArray = np.cumsum(enclosed) * enclosed
-    return numbers[labels]
+def _best(picture: Picture, view: View, alpha: Alpha | None) -> Opinion:
+    """The best supported opinion; alpha's own, of a picture that is all but opaque, where nothing else is clear."""
+    frame = find_frame(view.features)
+    chosen = _chosen(view.within(frame))
+    if chosen is None and frame != NO_FRAME:  # there is nothing inside: it is no frame, it is the background
+        frame, chosen = NO_FRAME, _chosen(view)
+    if alpha is not None and alpha.opaque.any() and not alpha.opaque.all() and (chosen is None or chosen.support < 0.9):
+        return Opinion(alpha.opaque, alpha.notes, 1.0)
+    if chosen is None:
+        raise _no_object(picture, "has no colour and no grey level that stands out")
+    return _reframed(righted(chosen, view.within(frame).features), view.levels.shape, frame)
 
 
-def _border(array: AnyArray) -> AnyArray:
-    return np.concatenate([array[0], array[-1], array[1:-1, 0], array[1:-1, -1]])
+def _chosen(view: View) -> Opinion | None:
+    """Colour or lightness; None if neither sees anything."""
+    colour = by_colour.opinion(view)
+    lightness = by_lightness.split(view) if np.ptp(view.levels) > 0 else None
+    if colour is None or lightness is None:
+        return colour or lightness
+    apart = disagreement(colour.mask, lightness.mask)
+    if apart <= AGREED and not lightness.is_clear and (colour.is_clear or colour.support >= TRUSTED):
+        return colour.saying(*colour.remarks)
+    if apart <= AGREED:
+        warnings = [remark for remark in colour.remarks if remark.startswith("warning")]
+        return Opinion(lightness.mask, (*lightness.notes, *warnings), max(colour.support, lightness.support))
+    if colour.is_clear or colour.support >= (lightness.support if lightness.is_clear else TRUSTED):
+        other = "light" if "lighter" in lightness.notes[1] else "dark"
+        share = f"{_share(lightness.mask, colour.mask)} of this: --object {other}"
+        return colour.saying(*colour.remarks, f"lightness alone would find another object, {share}")
+    share = f"{_share(colour.mask, lightness.mask)} of this: --background '{colour.colour}'"
+    return lightness.saying(*lightness.remarks, f"colour alone would find another object, {share}")
 
 
-def _smaller_than(n_pixels: int, labels: IntArray) -> tuple[BoolArray, int]:
-    """Where the labelled parts with fewer than `n_pixels` pixels are, and how many of them there are."""
-    small = np.bincount(labels.ravel()) < n_pixels
-    small[0] = False
-    return small[labels], int(small.sum())
+def _share(mask: BoolArray, of: BoolArray) -> str:
+    return f"{mask.sum() / max(1, of.sum()):.0%}"
 
 
-def _counted(count: int, noun: str) -> str:
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+def _reframed(found: Opinion, shape: tuple[int, ...], frame: Frame) -> Opinion:
+    """The opinion on the whole picture, of whose frame nothing is object."""
+    if frame == NO_FRAME:
+        return found
+    top, bottom, left, right = frame
+    mask = np.pad(found.mask, ((top, bottom), (left, right)))
+    said = f"a dark frame, at most {max(frame)} pixels wide, is no part of the object: --object dark takes it in"
+    return Opinion(mask, (*found.notes, said), found.support)
+
+
+def _inner_notes(picture: Picture, alpha: Alpha) -> list[str]:
+    """A word on what is drawn inside an opaque tile: it may be what was meant."""
+    assert picture.grey is not None
+    top, bottom, left, right = _extent(alpha.opaque)
+    if alpha.opaque[top:bottom, left:right].mean() < TILE:
+        return []
+    frame = (top, len(alpha.opaque) - bottom, left, alpha.opaque.shape[1] - right)
+    view = _view_of(picture, alpha).within(frame)
+    inner = by_colour.opinion(view)
+    if inner is None or inner.support < 0.9 or border(inner.mask).mean() > 0.02:
+        return []
+    is_darker = np.median(view.levels[inner.mask]) < np.median(view.levels[~inner.mask])
+    side, shape = ("dark", "a darker") if is_darker else ("light", "a lighter")
+    return [f"there is {shape} shape inside: --object {side} takes that"]
+
+
+def _extent(mask: BoolArray) -> Frame:
+    """The rows and columns that a mask extends over: top, bottom, left, right, the ends not in it."""
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    return int(rows[0]), int(rows[-1]) + 1, int(columns[0]), int(columns[-1]) + 1

@@ -2,19 +2,23 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from autopoly_env.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from autopoly_env.errors import ConfigError, SilhouetteError
-from autopoly_env.silhouette import object_mask
+from autopoly_env.silhouette import cleaning, object_mask
+from autopoly_env.silhouette.connectivity import is_slanting_line
 from autopoly_env.silhouette.image_files import find_images
-from autopoly_env.silhouette.loading import ImageSource, read_picture
+from autopoly_env.silhouette.loading import ImageSource, Picture, read_frames
+from autopoly_env.silhouette.options import DEFAULT_OPTIONS, ObjectOptions
 
-__all__ = ["ImageSource", "Silhouette", "Target", "find_images", "load_silhouette"]
+__all__ = ["SMALL", "ImageSource", "Silhouette", "Target", "find_images", "load_silhouette"]
 
 WEIGHT_STEPS = 2**20  # of a weight of 1
+SMALL = 64  # pixels a side; a smaller picture has too few pixels to tell shapes apart by counting them
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -32,10 +36,14 @@ class Target:
     Where cells are not all worth the same, `weights` (R, R) >= 0 say so, rounded to multiples of 2**-20: sums of them
     are then exact. `weight_sum` (R, R+1) are their prefix sums, None without, and each sum above (`mask_sum` and
     `n_filled` as float64) counts every cell times its weight.
+
+    `by_area`: the IoU counts a cell by the share of it that a mesh covers; otherwise as 1 from half coverage on, as the
+    paper does.
     """
 
     coverage: FloatArray
     weights: FloatArray | None = None
+    by_area: bool = False
     mask: BoolArray = field(init=False)
     row_sum: FloatArray = field(init=False)
     row_square_sum: FloatArray = field(init=False)
@@ -71,7 +79,7 @@ class Target:
         return f"Target(resolution={self.resolution})"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Target, (self.coverage, self.weights)  # so that an unpickled one is read-only as well
+        return Target, (self.coverage, self.weights, self.by_area)  # so that an unpickled one is read-only as well
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,10 +115,19 @@ class Silhouette:
         """R, in pixels a side."""
         return len(self.mask)
 
+    @cached_property
+    def is_scored_by_area(self) -> bool:
+        """Whether the picture has so few pixels that it is scored on exact areas: fewer than `SMALL` a side.
+
+        Not so drawings in lines one pixel wide, some of them slanting: their pixels are steps, which nobody means.
+        """
+        return self.resolution < SMALL and not is_slanting_line(self.mask)
+
     def target(self, resolution: int) -> Target:
         """The silhouette on a grid of `resolution` x `resolution` cells: exact area averages, kept once made.
 
-        The resolution need not divide the silhouette's own, and may exceed it (which gives blocks).
+        The resolution need not divide the silhouette's own, and may exceed it (which gives blocks). At its own, that of
+        a small picture is scored by area.
 
         Raises ConfigError for a resolution below 1.
         """
@@ -118,7 +135,8 @@ class Silhouette:
             raise ConfigError(f"target resolution {resolution} is too small; expected at least 1: raise it")
         if resolution not in self._targets:
             weights = None if self.weights is None else area_means(self.weights, (resolution, resolution))
-            self._targets[resolution] = Target(_area_average(self.mask, resolution), weights)
+            by_area = self.is_scored_by_area and resolution == self.resolution
+            self._targets[resolution] = Target(_area_average(self.mask, resolution), weights, by_area)
         return self._targets[resolution]
 
     def pyramid(self, levels: Sequence[int]) -> tuple[Target, ...]:
@@ -130,32 +148,42 @@ class Silhouette:
         return Silhouette, given  # without the targets: cheaper made than sent
 
 
-def load_silhouette(source: ImageSource, *, name: str | None = None, min_component: int | None = None) -> Silhouette:
+def load_silhouette(
+    source: ImageSource, *, name: str | None = None, options: ObjectOptions = DEFAULT_OPTIONS
+) -> Silhouette:
     """Load an image and find the object in it.
 
     `source` is a path, a binary file object, a PIL image or an array: (H, W) or (H, W, 1 to 4), uint8 or
-    float in 0..1, or a boolean mask (True is object). The object is what the alpha channel shows, where that
-    varies; otherwise Otsu's threshold splits the grey levels and the class of most border pixels is the
-    background. Components and holes with fewer than `min_component` pixels are removed (by default max(4,
-    2e-5 of the area); 0 keeps all), pictures larger than 2048 pixels a side are reduced by an integer factor,
-    and others than square ones are padded with background.
+    float in 0..1, or a boolean mask (True is object). The object is what the alpha channel shows, where a real share of
+    the picture is clear; otherwise what differs in colour or lightness from the background, which most of the border
+    shows (docs/pictures-in.md). Specks and pinholes go, pictures larger than 2048 pixels a side are reduced by an
+    integer factor, and others than square ones are padded with background. The notes say what was decided, `options`
+    decide otherwise.
 
-    Raises SilhouetteError when the source cannot be read or holds no object, ConfigError for a negative
-    `min_component`.
+    Raises SilhouetteError when the source cannot be read, holds no object or not what the options ask for.
 
     >>> load_silhouette(np.eye(3, dtype=bool), name="diagonal")
     Silhouette(name='diagonal', notes=('object touches the border of the image',))
     """
-    if min_component is not None and min_component < 0:
-        raise ConfigError(f"min_component is {min_component}; expected pixels, 0 or more: 0 keeps every speck")
-    picture = read_picture(source)
-    mask, how_found = object_mask.find_object(picture)
-    mask, how_cleaned = object_mask.clean(mask, min_component)
-    look = object_mask.describe(mask)
+    picture, mask, how_found = _first_object(source, options)
+    mask, how_cleaned = cleaning.clean(mask, options)
     shape = mask.shape
-    mask, how_padded = object_mask.square(mask)
-    notes = (*picture.notes, *how_found, *how_cleaned, *look, *how_padded)
+    mask, how_padded = cleaning.square(mask)
+    notes = (*picture.notes, *how_found, *how_cleaned, *how_padded)
     return Silhouette(mask, picture.name if name is None else name, notes, (shape[0], shape[1]))
+
+
+def _first_object(source: ImageSource, options: ObjectOptions) -> tuple[Picture, BoolArray, list[str]]:
+    """The first frame in which there is an object, its mask and the notes on it."""
+    problems: list[SilhouetteError] = []
+    for picture in read_frames(source):
+        try:
+            return picture, *object_mask.find_object(picture, options)
+        except SilhouetteError as problem:
+            problems.append(problem)
+    if len(problems) == 1:
+        raise problems[0]
+    raise SilhouetteError(f"{problems[0]} (so it is in all of its {len(problems)} frames)")
 
 
 def _area_average(mask: BoolArray, resolution: int) -> FloatArray:

@@ -8,9 +8,11 @@ A source gives a `Silhouette` for every seed, the same one each time:
 
 import inspect
 import os
+from dataclasses import fields
 from typing import Any
 
 from autopoly_env.errors import ConfigError
+from autopoly_env.silhouette import ObjectOptions
 from autopoly_env.targets.construction import ConstructionTargets
 from autopoly_env.targets.folder import FolderTargets
 from autopoly_env.targets.objects import ObjectTargets
@@ -38,7 +40,9 @@ _KINDS: dict[str, type[ConstructionTargets] | type[ObjectTargets] | type[ShapeNe
 
 
 def make_targets(name_or_folder: str | os.PathLike[str], **options: Any) -> TargetSource:
-    """The source "construction", "objects" or "shapenet" with its options, or else the images of a folder (no options).
+    """The source "construction", "objects" or "shapenet" with its options, or else the images of a folder.
+
+    The options of a folder are those of `ObjectOptions`.
 
     Raises ConfigError for another name, for an option that the source does not have or allow, or needs; SilhouetteError
     for a folder without images.
@@ -47,9 +51,11 @@ def make_targets(name_or_folder: str | os.PathLike[str], **options: Any) -> Targ
     if name not in _KINDS:
         if not os.path.isdir(name):
             raise ConfigError(f"targets {name!r}: expected {', '.join(_KINDS)} or the path of a folder of images")
-        if options:
-            raise ConfigError(f"targets {name!r}: a folder of images has no options; leave out {', '.join(options)}")
-        return FolderTargets(name)
+        known = [field.name for field in fields(ObjectOptions)]
+        strange = [option for option in options if option not in known]
+        if strange:
+            raise ConfigError(f"targets {name!r}: folders have no option {strange[0]!r}; give {', '.join(known)}")
+        return FolderTargets(name, ObjectOptions(**options))
     allowed = inspect.signature(_KINDS[name]).parameters
     unknown = [option for option in options if option not in allowed]
     if unknown:

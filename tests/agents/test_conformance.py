@@ -52,11 +52,12 @@ def test_agent__conforms(name: str, operators: str) -> None:
     options = {"mcts": {"n_simulations": 2, "hop_patience": 1}}.get(name, {})
     agent, other = (quick(name, **options) for _ in range(2))
     shapes = [TARGETS["island"], TARGETS["blobs"]]
-    check_agent(agent, shapes, reports_a_step=2 if name == "mcts_paper" else 1, operators=operators)
-    once = {target: agent.solve(simulator(target, operators=operators)) for target in TARGETS}
+    rules = {"operators": operators, "faces": "quads" if operators == "modeller" else "any"}
+    check_agent(agent, shapes, reports_a_step=2 if name == "mcts_paper" else 1, **rules)
+    once = {target: agent.solve(simulator(target, **rules)) for target in TARGETS}
     for target, solution in once.items():
-        assert_consistent(solution, simulator(target, operators=operators))
-    anew = other.solve(simulator("island", operators=operators))
+        assert_consistent(solution, simulator(target, **rules))
+    anew = other.solve(simulator("island", **rules))
     assert once["island"].sequence.to_json() == anew.sequence.to_json() != once["house"].sequence.to_json()
 
 

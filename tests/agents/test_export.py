@@ -80,6 +80,14 @@ def test_html__is_the_default_and_shows_the_target(run: Run) -> None:
     assert "data:image/png;base64," in page and "<title>house" in page
 
 
+def test_target__is_the_object_that_the_options_name_and_is_shown(run: Run) -> None:
+    sequence, image = saved(), target_image()
+    assert run(sequence, "--target", image, "--object", "dark", "--show-mask").code == 0
+    assert (np.asarray(Image.open("target-mask.png")) == 0).sum() == 64 * 64 - 32 * 40
+    refused = run(sequence, "--show-mask")
+    assert refused.code == 2 and "--target; give one" in refused.err
+
+
 def test_obj__is_the_last_mesh_or_that_of_a_step(run: Run) -> None:
     meshes = house().meshes()
     run(saved(), "--to", "obj")

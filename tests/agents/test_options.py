@@ -2,12 +2,14 @@
 
 import doctest
 import json
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from agents import options
-from agents.options import put_override
+from agents.options import put_override, read_yaml
+from agents.registry import make_agent
 from autopoly_env.errors import ConfigError
 
 
@@ -61,3 +63,34 @@ def test_override__says_in_one_line_what_is_wrong(text: str, complaint: str) -> 
 
 def test_examples__are_true() -> None:
     assert doctest.testmod(options).failed == 0
+
+
+BOMB = "\n".join(["a0: &a0 [x, x, x]", *(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 30))])
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("!!timestamp x", "has no attribute"),
+        (BOMB, "more than 100000 values"),
+        ("&a [*a]", "a part of itself"),
+        ("[" * 3000, ""),
+        ("0x" + "f" * 9, "holds a int"),
+        ("a" * 1_000_001, "it has more than 1 MB"),
+    ],
+    ids=["date", "bomb", "ring", "brackets", "number", "size"],
+)
+def test_damaged_yaml__is_one_short_line(tmp_path: Path, text: str, problem: str) -> None:
+    path = tmp_path / "odd.yaml"
+    path.write_text(text)
+    with pytest.raises(ConfigError) as caught:
+        read_yaml(path)
+    message = str(caught.value)
+    assert problem in message
+    assert message.isprintable() and len(message) <= 400
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), 10**20, -(10**400)])
+def test_number_that_no_option_can_be__is_named_by_its_key(value: float) -> None:
+    with pytest.raises(ConfigError, match=r"^(agent 'mcts', option )?(seed|exploration)"):
+        make_agent("mcts", **{"exploration" if isinstance(value, float) else "seed": value})

@@ -124,6 +124,12 @@ def test_command__writes_the_results_and_tells_what_was_kept(run: Run) -> None:
     assert sorted(os.listdir("made/box")) == ["mesh.obj", "mesh.svg", "player.html", "sequence.json", "steps.png"]
 
 
+def test_command__takes_the_object_that_the_options_name(run: Run) -> None:
+    done = run("ell.json", "box.png", "--refits", 20, "--out", "made", "--object", "light", "--show-mask")
+    assert (done.code, done.err) == (0, "")
+    assert "mask.png" in os.listdir("made/box")
+
+
 def test_json__is_one_record_of_the_scores_before_and_after(run: Run) -> None:
     done = run("ell.json", "box.png", "--refits", 40, "--json", "--quiet")
     record = json.loads(done.out)

@@ -119,7 +119,44 @@ def test_solve__shows_a_table_with_means_and_names_the_overview_last(run: Run) -
     assert float(rows["mean"][5]) == pytest.approx(np.mean(totals), abs=0.011)  # after "of 2" and three columns
     assert "note: object has 1 hole: mug" in lines
     assert lines[-1] == "Open deep/results/overview.png"
-    assert Image.open("deep/results/overview.png").width == 2 * 256
+    assert Image.open("deep/results/overview.png").width == 2 * (256 + 64)
+
+
+def test_solve__takes_the_object_that_the_options_name_and_shows_it(run: Run, tmp_path: Path) -> None:
+    picture = Image.new("RGB", (64, 64), "white")
+    picture.paste("red", (8, 8, 40, 40))
+    picture.paste("blue", (30, 30, 50, 50))
+    picture.save(tmp_path / "two.png")
+    done = run(tmp_path / "two.png", "--json", "--agent", "trace", "--object", "blue", "--show-mask")
+    record = json.loads(done.out)
+    assert record["settings"]["picture"] == {"object": "blue"}
+    assert (np.asarray(Image.open(record["files"]["mask.png"])) == 0).sum() == 400
+    assert load_silhouette(record["files"]["mask.png"]).mask.sum() == 400
+
+
+def test_solve__counts_what_it_skips_in_a_folder(run: Run, tmp_path: Path) -> None:
+    folder = tmp_path / "mixed"
+    folder.mkdir()
+    Image.new("L", (32, 32), 255).save(folder / "blank.pbm")
+    for name in ("a.txt", "b.md", "c.csv", "d.py"):
+        (folder / name).touch()
+    done = run(folder, "--agent", "trace")
+    assert done.code == 1 and "note: 4 files are no pictures and were skipped: a.txt, b.md, c.csv, …" in done.err
+    assert "blank.pbm" in done.err
+
+
+@pytest.mark.parametrize(
+    ("options", "finding"),
+    [
+        (("--object", "reddish"), "object 'reddish' is not known"),
+        (("--threshold", 2), "threshold is 2; expected a number between 0 and 1"),
+        (("--object", "alpha", "--background", "red"), "leave one of them out"),
+        (("--keep-specks", "--min-speck", 3), "contradict each other"),
+    ],
+)
+def test_solve__refuses_options_of_pictures_before_any_work(run: Run, options: tuple[Any, ...], finding: str) -> None:
+    done = run(EXAMPLES / "mug.png", *options)
+    assert done.code == 2 and finding in done.err and done.err.count("\n") == 1
 
 
 def test_columns__are_those_that_are_asked_for(run: Run) -> None:

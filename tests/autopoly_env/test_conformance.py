@@ -238,6 +238,31 @@ def test_broken_source__is_caught_with_the_rule_it_breaks(rule: str) -> None:
         check_target_source(Source(rule), n=4)
 
 
+class Odd:
+    """A source that is none, and raises what nobody expects."""
+
+    name = "odd"
+
+    def sample(self, seed: int) -> Any:
+        raise ZeroDivisionError("oh")
+
+
+@pytest.mark.parametrize(
+    "check",
+    [
+        lambda: check_target_source(Odd()),
+        lambda: check_target_source(object()),  # type: ignore[arg-type]
+        lambda: check_env(object()),
+        lambda: check_simulator(object()),  # type: ignore[arg-type]
+        lambda: conformance.check_operator(object()),  # type: ignore[arg-type]
+    ],
+)
+def test_check__raises_what_it_promises_whatever_it_is_given(check: Callable[[], None]) -> None:
+    with pytest.raises(ConformanceError, match="it raises") as caught:
+        check()
+    assert str(caught.value).isprintable()
+
+
 # --- formats
 
 

@@ -144,8 +144,6 @@ def test_sequences__that_break_their_rule_are_refused() -> None:
 
 def test_a_step_that_breaks_the_rule__is_named() -> None:
     score = {"iou": 0.5, "complexity": 9, "self_intersections": 0, "total": 1.0}
-    after = Simulator(painted(BOTTLE), start=SQUARE).trial_of
-    del after
     made = PolyMesh.from_faces([*SQUARE.vertices, (0.5, 0.25)], [(0, 4, 1, 2, 3)])
     with pytest.raises(SequenceError, match="face 0 of the mesh after step 1 has 5 corners"):
         ConstructionSequence.record(

@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from autopoly_env.errors import OutputError
-from autopoly_env.files import write_atomically
+from autopoly_env.files import file_stem, read_text, write_atomically
 
 
 @pytest.mark.parametrize(("data", "stored"), [("ümlaut\n", "ümlaut\n".encode()), (b"\x00\xff", b"\x00\xff")])
@@ -80,3 +82,42 @@ def test_write__refuses_an_unwritable_folder(tmp_path: Path) -> None:
 def test_write__never_replaces_a_device() -> None:
     with pytest.raises(OutputError, match="no ordinary file"):
         write_atomically("/dev/null", "text")
+
+
+@pytest.mark.parametrize("name", ["a" * 251 + ".png", "é" * 125 + ".json"])
+def test_write__takes_names_as_long_as_the_disk_does(tmp_path: Path, name: str) -> None:
+    write_atomically(tmp_path / name, "text")
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+@pytest.mark.parametrize("path", ["é" * 300, "a\0b", "", "/"])
+def test_write__refuses_what_is_no_name_in_one_line(path: str) -> None:
+    with pytest.raises(OutputError, match=r"^cannot write "):
+        write_atomically(path, "text")
+
+
+@given(st.text(st.characters(codec=None, exclude_characters="/\0"), min_size=1, max_size=120))
+def test_stem__is_a_name_that_leaves_room_for_more(name: str) -> None:
+    stem = file_stem(Path(name + ".png"))
+    assert 0 < len(stem.encode()) <= 200
+    assert not stem.startswith(".")
+
+
+def test_read__takes_an_ordinary_file_within_bounds_only(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    path.write_bytes("ümlaut".encode())
+    assert read_text(path, 7) == "ümlaut"
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    path.with_name("bytes").write_bytes(b"\xff")
+    for bad, most, reason in (
+        (path, 6, "it has more than 6e-06 MB"),
+        (pipe, 9, "it is no ordinary file"),
+        (tmp_path, 9, "Is a directory"),
+        (tmp_path / "bytes", 9, "not UTF-8 text"),
+        (tmp_path / "a\0b", 9, "embedded null byte"),
+        (tmp_path / "none", 9, "No such file or directory"),
+    ):
+        with pytest.raises(OSError) as caught:
+            read_text(bad, most)
+        assert caught.value.strerror == reason

@@ -107,7 +107,7 @@ def test_iou__does_not_see_how_a_shape_is_divided_into_faces() -> None:
 @pytest.mark.parametrize("seed", range(8))
 def test_iou__of_a_polygon_equals_that_of_its_exact_areas(seed: int) -> None:
     points = star(seed, 9)
-    target = noise(seed, 16).target(16)
+    target = Target(noise(seed, 16).target(16).coverage)  # that counts pixels, small as it is
     drawn = shapely_coverage(shapely.Polygon(points), 16) >= 0.5
     expected = (drawn & target.mask).sum() / (drawn | target.mask).sum()
     assert intersection_over_union(polygon(points), target) == expected
@@ -159,3 +159,26 @@ def test_self_intersections__equal_shapelys_where_all_is_degenerate(
 ) -> None:
     mesh = polygon(step * np.array(corners))
     assert self_intersections(mesh) == pairs_that_meet(mesh.vertices, mesh.edges)
+
+
+# --- small pictures: exact areas ---
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 63))
+def test_iou__of_a_small_picture_is_that_of_the_shapes(seed: int, resolution: int) -> None:
+    rng = np.random.default_rng(seed)
+    mask = rng.random((resolution, resolution)) < 0.5
+    mask[rng.integers(resolution), rng.integers(resolution)] = True
+    mesh = polygon(star(seed, 7))
+    pixels = shapely.union_all([shapely.box(x, y, x + 1, y + 1) for y, x in np.argwhere(mask)])
+    shape = shapely.Polygon(mesh.vertices[list(mesh.faces[0])] * resolution)
+    expected = shape.intersection(pixels).area / shape.union(pixels).area
+    target = Target(mask.astype(np.float64), by_area=True)
+    assert intersection_over_union(mesh, target) == pytest.approx(expected, abs=1e-9)
+
+
+def test_iou__counts_areas_of_small_pictures_but_not_of_slanting_lines() -> None:
+    assert painted(SQUARE, 32).target(32).by_area
+    assert not Silhouette(np.eye(32, dtype=np.bool_)).target(32).by_area
+    assert not painted(SQUARE, 64).target(64).by_area
+    assert not painted(SQUARE, 32).target(64).by_area  # blocks of a small one, as a refit sees it

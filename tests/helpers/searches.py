@@ -22,6 +22,8 @@ from autopoly_env.simulator import Simulator, State
 class Game:
     """A game drawn by hand: totals by name, children by name. `expanded` are the children made, in order."""
 
+    n_refits = 0  # that are counted: its states say themselves what they took
+
     def __init__(self, totals: dict[str, float], children: dict[str, str], twins: str = "") -> None:
         self.children = children
         self.states = {name: _state(twins[0] if name in twins else name, name, t) for name, t in totals.items()}
@@ -33,6 +35,9 @@ class Game:
     def transition_all(self, state: State, actions: Sequence[Action]) -> list[State]:
         self.expanded += "".join(action.operator for action in actions)
         return [self.states[action.operator] for action in actions]
+
+    def hairlines(self, _mesh: PolyMesh) -> int:
+        return 0
 
 
 class InOrder(UniformEvaluator):

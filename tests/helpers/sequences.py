@@ -3,6 +3,7 @@
 from typing import Any
 
 from agents.baselines.random_agent import RandomAgent, RandomConfig
+from autopoly_env.errors import IllegalActionError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import OPERATORS, Action
 from autopoly_env.sequence import ConstructionSequence
@@ -28,9 +29,9 @@ def gabled(name: Any = "house") -> ConstructionSequence:
     return ConstructionSequence.record({"target": name}, square, SCORE, steps)
 
 
-def walked(seed: int, n_steps: int = 40, shake: float = 0.0) -> ConstructionSequence:
-    """A random walk over all operators, wherever it leads: crossings, pinches, several parts."""
-    walk = random_walk(seed, n_steps=n_steps, shake=shake)
+def walked(seed: int, n_steps: int = 40, shake: float = 0.0, operators: str = "full") -> ConstructionSequence:
+    """A random walk over the operators of a preset, wherever it leads: crossings, pinches, several parts."""
+    walk = random_walk(seed, operators, n_steps, shake)
     steps = [(step.action, step.choice, step.after, SCORE) for step in walk]
     return ConstructionSequence.record({"target": f"walk {seed}"}, walk[0].before, SCORE, steps)
 
@@ -41,6 +42,9 @@ def played(seed: int, n_steps: int = 25) -> ConstructionSequence:
     agent = RandomAgent(RandomConfig(seed=seed, n_steps=n_steps))
     states = [simulator.initial()]
     while not states[-1].done:
-        states.append(simulator.transition(states[-1], agent.act(simulator, states[-1]).action))
+        try:
+            states.append(simulator.transition(states[-1], agent.act(simulator, states[-1]).action))
+        except IllegalActionError:  # it has no room
+            states[-1] = simulator.idle(states[-1])
     steps = [(state.action, state.choice, state.mesh, SCORE) for state in states[1:] if state.action is not None]
     return ConstructionSequence.record({"target": f"noise {seed}"}, states[0].mesh, SCORE, steps)

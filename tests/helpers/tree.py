@@ -16,6 +16,8 @@ class Tree:
 
     weights = ScoreWeights(w_sc=1.0)
 
+    n_refits = 0  # that are counted: its states say themselves what they took
+
     def __init__(self, totals: dict[str, float], children: dict[str, str], twins: str = "", rich: str = "") -> None:
         self.children = children
         self.twins = twins  # nodes that are one shape
@@ -36,6 +38,12 @@ class Tree:
     def transition_all(self, state: State) -> list[State]:
         self.visited.append(self.name(state))
         return [self.states[child] for child in self.children.get(self.name(state), "")]
+
+    def is_sound(self, _mesh: PolyMesh) -> bool:
+        return True
+
+    def standing(self, state: State) -> float:
+        return state.score.total
 
     def search(self, budget: Budget | None = None, **options: Any) -> tuple[str, str]:
         """(the nodes visited, the best node) of a beam search from node r."""

@@ -18,6 +18,7 @@ import pytest
 import shapely
 from PIL import Image
 
+from autopoly_env.errors import OutputError
 from tests.helpers.commands import Run, Said, runner
 from tests.helpers.drawings import HOUSE, L_SHAPE, SQUARE, painted
 from tests.helpers.paths import ROOT
@@ -176,7 +177,7 @@ def test_row_with_other_weights__searches_with_them(run: Run) -> None:
 def test_json__prints_the_rows_and_nothing_else(run: Run) -> None:
     done = run("tiny.yaml", "--out", "out", "--json", "--baseline", "random", "--agents", "random,trace")
     rows = [json.loads(line) for line in done.out.splitlines()]
-    assert [row["agent"] for row in rows] == ["trace", "random", "soothsayer"]
+    assert [row["agent"] for row in rows] == ["trace", "random"]  # and not the one that is missing
     assert rows[1]["wins"] == rows[1]["losses"] == 0
     assert rows[0]["shapes"] == 3
 
@@ -202,6 +203,35 @@ def test_folder__is_measured_with_agents_by_name(run: Run) -> None:
         (agent, target) for agent in ("dr-simple", "decimate") for target in ("box", "ell")
     }
     assert sorted(os.listdir("out/evaluate/pictures/targets")) == ["box.png", "ell.png"]
+
+
+def test_names_of_all_kinds__are_measured_and_shown_tame(run: Run) -> None:
+    images("d" * 251, "b\nc\x1b[2J")
+    done = run("pictures", "--agents", "dr-simple", "--out", "out")
+    assert (done.code, done.err) == (0, "")
+    assert {key[1] for key in results("out")} == {"d" * 200, "b\nc\x1b[2J"}
+    assert all(line.isprintable() for line in done.out.splitlines())
+
+
+def test_picture_that_cannot_be_written__is_a_failed_task(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    images("box", "ell")
+
+    def refuse(path: Path, _: bytes) -> None:
+        raise OutputError(f"cannot write {path} (File name too long); give a writable path")
+
+    monkeypatch.setattr("training.evaluation.run.write_atomically", refuse)
+    done = run("pictures", "--agents", "dr-simple", "--out", "out")
+    assert done.code == 1
+    assert [line["error"] for line in lines("out")] == [
+        f"cannot write out/targets/{name}.png (File name too long); give a writable path" for name in ("box", "ell")
+    ]
+
+
+def test_table__shows_the_rows_that_were_asked_for(run: Run) -> None:
+    assert run("tiny.yaml", "--agents", "dr-simple,trace", "--out", "out").code == 0
+    shown = run("tiny.yaml", "--agents", "trace", "--out", "out", "--resume", "--json").out
+    assert [json.loads(line)["agent"] for line in shown.splitlines()] == ["trace"]
+    assert [row["agent"] for row in table("out") if row["shapes"] != "0"] == ["trace", "dr-simple"]
 
 
 def test_unreadable_image__fails_alone(run: Run) -> None:
@@ -281,6 +311,17 @@ def test_run__goes_on_when_a_row_says_something_else_of_what_is_missing(run: Run
     Path("tiny.yaml").write_text(text.replace("no weights yet", "gone to Delphi"))
     done = run("tiny.yaml", "--out", "out", "--set", "targets.n=1", "--resume")
     assert done.code == 0 and "gone to Delphi" in done.out
+
+
+def test_rule_of_faces__is_a_key_of_the_suite_that_runs_of_before_have_not(run: Run) -> None:
+    assert run("tiny.yaml", "--out", "out", "--agents", "dr-simple").code == 0
+    info = json.loads(Path("out/run.json").read_text())
+    assert info["suite"].pop("faces") == "any"
+    Path("out/run.json").write_text(json.dumps(info))
+    assert run("tiny.yaml", "--out", "out", "--agents", "dr-simple", "--resume").code == 0
+    done = run("tiny.yaml", "--out", "out", "--agents", "dr-simple", "--faces", "quads", "--resume")
+    assert done.code == 1 and '(faces: "any" there, "quads" here)' in done.err
+    assert run("tiny.yaml", "--out", "ruled", "--agents", "dr-simple", "--faces", "quads").code == 0
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 import io
 import json
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,7 +39,7 @@ def tasks_of(
     check_view(view, resolution)
     models: dict[Path, str] = {}
     for path in given:
-        if path.is_dir():
+        if os.path.isdir(path):
             found = ShapeNetTargets(path, categories, split, view, resolution).models
             models |= {model.path: model.name for model in found}
         else:
@@ -83,7 +84,7 @@ def _read_with_trimesh(path: Path) -> Surface:
     """The triangles of all that is in a file. Raises SilhouetteError for one that trimesh cannot read."""
     import trimesh
 
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise SilhouetteError(f"cannot read {path} (no such file); give the file of a model")
     try:
         mesh = trimesh.load_scene(path).to_mesh()

@@ -6,6 +6,8 @@ from collections import Counter, defaultdict
 from rich.console import Console
 
 from agents.commands.progress import TASK, progress_bar
+from agents.commands.screen import say
+from autopoly_env.shown import tame
 from training.evaluation.tasks import EvalTask
 from training.records import Record
 
@@ -68,10 +70,10 @@ class Display:
             parts.insert(0, f"best so far {best} {self._sums[best] / self._counts[best]:.2f}")
         if self.n_failed:
             parts.insert(0, f"{self.n_failed} failed")
-        return "; ".join(parts)
+        return tame("; ".join(parts))
 
     def _say(self, text: str) -> None:
-        self._console.print(text, markup=False, highlight=False, emoji=False, soft_wrap=True)
+        say(self._console, text)
 
 
 def _key(task: EvalTask) -> tuple[str, str, int]:

@@ -22,6 +22,7 @@ from training.records import (
     target_path,
 )
 
+_SINCE = {"faces": "any"}  # keys of a suite that runs of before have not, and what they were run with
 TABLES = ("table.md", "table.csv")
 
 
@@ -38,8 +39,8 @@ def joined(info: RunInfo, other: RunInfo, folder: Path) -> RunInfo:
     agents = {entry["label"]: entry for entry in info.suite["agents"]}
     others = {entry["label"]: entry for entry in other.suite["agents"]}
     common = agents.keys() & others.keys()
-    ours = {**info.suite, "agents": {label: _measured(agents[label]) for label in common}}
-    theirs = {**other.suite, "agents": {label: _measured(others[label]) for label in common}}
+    ours = {**_SINCE, **info.suite, "agents": {label: _measured(agents[label]) for label in common}}
+    theirs = {**_SINCE, **other.suite, "agents": {label: _measured(others[label]) for label in common}}
     difference = _difference(ours, theirs)
     if difference:
         raise RunError(

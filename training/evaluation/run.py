@@ -6,12 +6,14 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from autopoly_env.errors import ConfigError
+from autopoly_env.arguments import is_count
+from autopoly_env.errors import ConfigError, OutputError
 from autopoly_env.files import write_atomically
+from autopoly_env.shown import short
 from training.evaluation.display import Display
 from training.evaluation.folder import begin, claim
 from training.evaluation.suite import GROUND_TRUTH, Suite, takes_seed
-from training.evaluation.targets import Target
+from training.evaluation.targets import SuiteTarget
 from training.evaluation.tasks import EvalTask, solve_task
 from training.parallel import check_engine, map_tasks
 from training.records import target_path
@@ -37,11 +39,11 @@ class TargetShard:
     def parse(cls, text: str) -> "TargetShard":
         """The shard "k/n". Raises ConfigError."""
         k, slash, n = text.partition("/")
-        if not (slash and k.isdecimal() and n.isdecimal() and 1 <= int(k) <= int(n)):
-            raise ConfigError(f"--shard {text}: expected k/n with 1 <= k <= n, such as 1/4")
+        if not (slash and is_count(k) and is_count(n) and 1 <= int(k) <= int(n)):
+            raise ConfigError(f"--shard {short(text)}: expected k/n with 1 <= k <= n, such as 1/4")
         return cls(int(k), int(n))
 
-    def of(self, targets: Sequence[Target]) -> Sequence[Target]:
+    def of(self, targets: Sequence[SuiteTarget]) -> Sequence[SuiteTarget]:
         """Its share of the targets."""
         return targets[self.k - 1 :: self.n]
 
@@ -85,12 +87,15 @@ def run_suite(
             for result in results:
                 record = result.value.record if result.value else result.task.failed(result.error or "no result")
                 if result.value and result.value.picture and not target_path(folder, record.target).exists():
-                    write_atomically(target_path(folder, record.target), result.value.picture)
+                    try:
+                        write_atomically(target_path(folder, record.target), result.value.picture)
+                    except OutputError as error:  # one name that the disk will not have is no reason to end the run
+                        record = result.task.failed(str(error))
                 writer.append(record)
                 display.done(result.task, record)
 
 
-def _players(suite: Suite, target: Target, missing: Collection[str], only: set[str]) -> Iterator[tuple[str, int]]:
+def _players(suite: Suite, target: SuiteTarget, missing: Collection[str], only: set[str]) -> Iterator[tuple[str, int]]:
     """Label and seed of all who try a target; who does not draw tries it once."""
     if target.is_known and (not only or GROUND_TRUTH in only):
         yield GROUND_TRUTH, suite.seeds[0]

@@ -171,10 +171,10 @@ def find_suite(given: str, overrides: Sequence[str] = ()) -> Suite:
     `overrides` are of the form "targets.n=10". Raises ConfigError where there is no such suite or it is not sound.
     """
     path, extra = FOLDER / f"{given}.yaml", list(overrides)
-    if not (given.isidentifier() and path.is_file()):
+    if not (given.isidentifier() and os.path.isfile(path)):
         path = Path(given)
-        if path.is_dir() or any(letter in given for letter in "*?["):
-            root, name = os.path.abspath(given), path.resolve().name if path.is_dir() else "images"
+        if os.path.isdir(path) or any(letter in given for letter in "*?["):
+            root, name = os.path.abspath(given), path.resolve().name if os.path.isdir(path) else "images"
             path = FOLDER / "folder.yaml"
             extra = [f"targets.root={json.dumps(root)}", f"name={json.dumps(name)}", *overrides]
         elif path.suffix not in (".yaml", ".yml"):

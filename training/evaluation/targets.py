@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import ClassVar, Literal
 
 from autopoly_env.errors import ConfigError, SilhouetteError
+from autopoly_env.files import file_stem
 from autopoly_env.sequence import ConstructionSequence
-from autopoly_env.silhouette import Silhouette, find_images, load_silhouette
+from autopoly_env.silhouette import DEFAULT_OPTIONS, ObjectOptions, Silhouette, find_images, load_silhouette
 from autopoly_env.targets import ConstructionTargets, ObjectTargets, split_seed
 from autopoly_env.targets.obj_file import read_obj
 from autopoly_env.targets.projection import silhouette_of
@@ -18,7 +19,7 @@ from autopoly_env.targets.shapenet import ShapeNetTargets
 
 
 @dataclass(frozen=True)
-class Target(ABC):
+class SuiteTarget(ABC):
     """One target. Its name is unlike that of any other of the suite and can be the name of a file."""
 
     name: str
@@ -48,7 +49,7 @@ class ConstructionSpec:
         """Where the shapes come from. Raises ConfigError for settings out of range."""
         return ConstructionTargets(self.difficulty, self.operators, self.resolution)
 
-    def targets(self) -> Sequence[Target]:
+    def targets(self) -> Sequence[SuiteTarget]:
         """The shapes number 0 to n - 1 of the split."""
         seeds = [split_seed(self.split, i) for i in range(self.n)]
         return [_ConstructionTarget(f"{self.source().name}_{seed}", self, seed) for seed in seeds]
@@ -68,7 +69,7 @@ class ObjectsSpec:
         """Where the drawings come from. Raises ConfigError for settings out of range."""
         return ObjectTargets(self.families, self.resolution)
 
-    def targets(self) -> Sequence[Target]:
+    def targets(self) -> Sequence[SuiteTarget]:
         """The drawings number 0 to n - 1 of the split."""
         source = self.source()
         seeds = [split_seed(self.split, i) for i in range(self.n)]
@@ -81,9 +82,10 @@ class FolderSpec:
 
     kind: Literal["folder"]
     root: str = ""  # a folder, or a pattern in which ** crosses folders
+    picture: ObjectOptions | None = None  # what in the pictures is the object; None leaves that to each
     n: int | None = None  # the first so many
 
-    def targets(self) -> Sequence[Target]:
+    def targets(self) -> Sequence[SuiteTarget]:
         """The images, each with a name of its own: its file's, with a number where another has that already."""
         if not self.root:
             raise ConfigError("this suite needs a folder of images; give python -m training.evaluate DIR")
@@ -91,9 +93,9 @@ class FolderSpec:
             paths = find_images([self.root])[: self.n]
         except SilhouetteError as error:
             raise ConfigError(str(error)) from None
-        stems = [path.stem.encode("utf-8", "replace").decode().lstrip(".").replace("\\", "_") for path in paths]
-        names = _unlike([stem or "image" for stem in stems])
-        return [_ImageTarget(name, path.resolve()) for name, path in zip(names, paths, strict=True)]
+        stems = [file_stem(path).replace("\\", "_") for path in paths]
+        names = _unlike(stems)
+        return [_ImageTarget(name, path.resolve(), self.picture) for name, path in zip(names, paths, strict=True)]
 
 
 @dataclass(frozen=True)
@@ -108,7 +110,7 @@ class ShapenetSpec:
     resolution: int = 256
     n: int | None = None  # the first so many of each category
 
-    def targets(self) -> Sequence[Target]:
+    def targets(self) -> Sequence[SuiteTarget]:
         """The models, in the order of their categories and ids."""
         if not self.root:
             raise ConfigError("this suite needs a folder of ShapeNet models; give --set targets.root=DIR")
@@ -125,7 +127,7 @@ TargetSpec = ConstructionSpec | ObjectsSpec | FolderSpec | ShapenetSpec
 
 
 @dataclass(frozen=True)
-class _ConstructionTarget(Target):
+class _ConstructionTarget(SuiteTarget):
     is_known: ClassVar[bool] = True
     spec: ConstructionSpec
     seed: int
@@ -138,7 +140,7 @@ class _ConstructionTarget(Target):
 
 
 @dataclass(frozen=True)
-class _ObjectTarget(Target):
+class _ObjectTarget(SuiteTarget):
     spec: ObjectsSpec
     seed: int
 
@@ -147,15 +149,16 @@ class _ObjectTarget(Target):
 
 
 @dataclass(frozen=True)
-class _ImageTarget(Target):
+class _ImageTarget(SuiteTarget):
     path: Path
+    picture: ObjectOptions | None = None
 
     def load(self) -> Silhouette:
-        return load_silhouette(self.path, name=self.name)
+        return load_silhouette(self.path, name=self.name, options=self.picture or DEFAULT_OPTIONS)
 
 
 @dataclass(frozen=True)
-class _ModelTarget(Target):
+class _ModelTarget(SuiteTarget):
     path: Path
     view: str
     resolution: int
@@ -179,6 +182,6 @@ def _unlike(names: Sequence[str]) -> list[str]:
 
 
 @lru_cache(maxsize=4)
-def load_target(target: Target) -> Silhouette:
+def load_target(target: SuiteTarget) -> Silhouette:
     """The silhouette of a target; the last few stay in memory, for the agents that come next."""
     return target.load()

@@ -17,7 +17,7 @@ from autopoly_env.score import Score
 from autopoly_env.sequence import ConstructionSequence, Lesson
 from autopoly_env.silhouette import Silhouette
 from training.evaluation.suite import GROUND_TRUTH, Entry, Suite, task_seed
-from training.evaluation.targets import Target, load_target
+from training.evaluation.targets import SuiteTarget, load_target
 from training.parallel import one_line
 from training.records import TARGET_SIZE, MeshData, Outcome, Record
 
@@ -30,7 +30,7 @@ class EvalTask:
     """An agent, by its label, and what it is to do."""
 
     agent: str
-    target: Target
+    target: SuiteTarget
     seed: int
     wants_picture: bool = False  # of the target, along with the record
 
@@ -153,4 +153,6 @@ def _warm_up(suite: Suite, entry: Entry) -> None:
         mask[6:26, 6:26] = True
         mask[12:20, 12:20] = False
         with suppress(Exception):
-            solved(suite.new_agent(entry, 0), suite.simulator(Silhouette(mask), entry), WARM_UP)
+            frame = solved(suite.new_agent(entry, 0), suite.simulator(Silhouette(mask), entry), WARM_UP)
+            if frame.stats.stopped_by == "interrupted":
+                raise KeyboardInterrupt  # the agent has caught it, but it was meant for the run

@@ -1,5 +1,6 @@
 """Settings of `training.train_rl`, and how a run notes and compares them."""
 
+import math
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -152,7 +153,7 @@ class RlRunConfig:
     def __post_init__(self) -> None:
         if min(self.total_steps, self.n_envs, self.eval_every, self.n_eval, self.save_every) < 1:
             raise ConfigError(f"{self}: expected steps, environments and targets of at least 1")
-        if min(self.seed, self.n_threads, self.minutes) < 0:
+        if min(self.seed, self.n_threads) < 0 or not 0.0 <= self.minutes < math.inf:
             raise ConfigError(f"{self}: expected a seed, n_threads and minutes of at least 0")
 
 

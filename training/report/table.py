@@ -14,6 +14,7 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
+from autopoly_env.shown import tame
 from training.report.comparison import Row
 from training.report.statistics import Interval
 
@@ -90,7 +91,8 @@ def as_rich(heads: Sequence[str], lines: Sequence[Line]) -> Table:
         drawn.add_column(head, justify="right", no_wrap=True)
     for line in lines:
         style = "dim italic" if line.is_quoted else ""
-        drawn.add_row(*(Text("\n".join(filter(None, (cell.text, cell.detail))), style) for cell in line.cells))
+        parts = (map(tame, filter(None, (cell.text, cell.detail))) for cell in line.cells)
+        drawn.add_row(*(Text("\n".join(part), style) for part in parts))
     return drawn
 
 

@@ -26,7 +26,7 @@ from autopoly_env.files import write_atomically
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.sequence import ConstructionSequence, Lesson, Step, parts_of
 from autopoly_env.sequence.effort import groups_to_move, seconds_of
-from autopoly_env.sequence.file import Score
+from autopoly_env.sequence.file import PlainScore
 from autopoly_env.sequence.ids import decoded
 from autopoly_env.silhouette import Silhouette
 
@@ -102,6 +102,9 @@ def _page_data(sequence: ConstructionSequence, target: Silhouette | None, title:
         steps.append(_pose(after, step.score, describe_step(step, len(motion["moved"]), n_left)) | motion)
         steps[-1]["seconds"] = round(seconds_of(step, before, after), 2)
         steps[-1]["part"] = parts.name(number)
+    lost = sequence.settings.get("lost")
+    if isinstance(lost, str):
+        steps[-1]["done"] = f"{steps[-1]['done']} Note: {lost}."
     return {
         "title": title,
         "lesson": describe_lesson(Lesson.of(sequence), len(parts.names)),
@@ -111,7 +114,7 @@ def _page_data(sequence: ConstructionSequence, target: Silhouette | None, title:
     }
 
 
-def _pose(mesh: PolyMesh, score: Score, words: Words) -> dict[str, Any]:
+def _pose(mesh: PolyMesh, score: PlainScore, words: Words) -> dict[str, Any]:
     """What the page knows of a step: where everything is after it, what it is worth and what there is to say."""
     ids = mesh.vertex_ids
     return {

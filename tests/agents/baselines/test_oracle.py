@@ -10,7 +10,6 @@ from agents.budget import Budget, Meter, Progress
 from agents.registry import make_agent
 from agents.solution import Track
 from autopoly_env.errors import ConfigError
-from autopoly_env.mesh import is_sane
 from autopoly_env.operators import STOP
 from autopoly_env.simulator import Simulator, State
 from tests.helpers.drawings import HOUSE, SQUARE, painted
@@ -39,12 +38,12 @@ class Counted(Tree):
 
 
 def everything(game: Simulator, state: State, depth: int) -> Iterator[State]:
-    """All states that `depth` actions lead to, one after the other, nothing merged: sane ones, as all agents want."""
+    """All states that `depth` actions lead to, one after the other, nothing merged: sound ones, as all agents want."""
     yield state
     if depth and not state.done:
         for action in game.legal_actions(state)[1:]:
             for child in game.transition_all(state, [action]):
-                if is_sane(child.mesh):
+                if game.is_sound(child.mesh):
                     yield from everything(game, child, depth - 1)
 
 
@@ -75,10 +74,10 @@ def test_exhaustive__goes_on_from_a_shape_once() -> None:
 @pytest.mark.parametrize(("target", "depth"), [("house", 2), ("blobs", 2)])
 def test_exhaustive__finds_what_brute_force_finds(target: str, depth: int) -> None:
     game = simulator(target, operators="edge_subdivide,edge_extrude,face_delete", resolution=16)
-    reached = [state.score.total for state in everything(game, game.initial(), depth)]
+    reached = [game.standing(state) for state in everything(game, game.initial(), depth)]
     agent = OracleAgent(OracleConfig(width=0, depth=depth, merge_grid=1e-9))
     bests = [best.state for _, best in agent._bests(game, Track(game.initial()), Meter.unlimited())]
-    assert max(state.score.total for state in bests) == max(reached)
+    assert max(map(game.standing, bests)) == max(reached)
     assert max(state.step for state in bests) <= depth
 
 

@@ -61,6 +61,8 @@ def test_seed__decides_and_nothing_else() -> None:
 def test_operators_that_are_missing__are_named() -> None:
     with pytest.raises(ConfigError, match="edge_cap is not among the operators: give the preset modeller"):
         make_agent("quads").solve(simulator())
+    with pytest.raises(ConfigError, match="quads builds convex faces: give faces=quads or convex"):
+        make_agent("quads").solve(simulator(operators="modeller"))
     assert not QuadsAgent(QuadsConfig()).suits(simulator())
     assert QuadsAgent(QuadsConfig()).suits(game())
 

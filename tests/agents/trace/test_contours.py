@@ -6,7 +6,6 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 import shapely
-import skimage.measure
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -14,7 +13,7 @@ from agents.trace.rings import signed_area, trace_rings
 from agents.trace.simplify import Contour
 from agents.trace.simplify_kernels import chord_errors, thin
 from autopoly_env.arrays import FloatArray
-from autopoly_env.silhouette import Silhouette
+from autopoly_env.silhouette import Silhouette, label_holes, label_parts
 from tests.helpers.drawings import FRAME, HOUSE, ISLAND, noise, painted
 from tests.helpers.rings import BOX, TRIANGLE, regular
 from tests.helpers.shapes import star
@@ -50,8 +49,8 @@ def test_rings__part_the_pixels_of_the_object_from_all_others(seed: int, resolut
         assert (signed_area(ring.points) < 0.0) == ring.is_hole
         layers += np.where(ring.is_hole, -1, 1) * shapely.contains_xy(shapely.Polygon(ring.points), x, y)
     np.testing.assert_array_equal(layers, silhouette.mask)
-    parts = skimage.measure.label(silhouette.mask, connectivity=1).max()
-    holes = skimage.measure.label(~np.pad(silhouette.mask, 1), connectivity=2).max() - 1
+    parts = label_parts(silhouette.mask.astype(np.float64)).max()
+    holes = label_holes(silhouette.mask.astype(np.float64)).max()
     assert [ring.is_hole for ring in rings] == [False] * parts + [True] * holes
     for ring in rings[parts:]:
         around = shapely.Polygon(rings[ring.parent].points)
@@ -150,7 +149,7 @@ def test_polygons__err_as_little_as_the_best_of_all_subsets(seed: int, n: int) -
 
 
 def test_chord_errors__are_areas_known_by_hand() -> None:
-    errors = chord_errors(np.array([(0.0, 0.0), (1.0, 1.0), (3.0, -1.0), (4.0, 0.0)]))
+    errors = chord_errors(np.array([(0.0, 0.0), (1.0, 1.0), (3.0, -1.0), (4.0, 0.0)]), 4)
     assert errors[0, 1] == errors[1, 2] == 0.0
     assert errors[0, 3] == pytest.approx(2.0)  # the path crosses the chord: a triangle of area 1 on either side
     assert errors[1, 3] == pytest.approx(2.0)  # triangle (1,1) (3,-1) (4,0)

@@ -69,14 +69,15 @@ def test_ties__are_the_linear_reduction_of_gradient_and_normal_matrix() -> None:
     assert not tied.ravel()[others].any() and (np.tril(normal)[others] == np.eye(10)[others]).all()
 
 
+@pytest.mark.parametrize(("operators", "n_steps"), [("full", 20), ("modeller", 10)])
 @given(st.integers(0, 2**32 - 1), st.sampled_from([True, 0.37]))
 @settings(max_examples=6)
-def test_symmetry__holds_after_any_play(seed: int, symmetry: bool | float) -> None:
-    game = Simulator(noise(seed, 32), resolution=32, symmetry=symmetry)
+def test_symmetry__holds_after_any_play(operators: str, n_steps: int, seed: int, symmetry: bool | float) -> None:
+    game = Simulator(noise(seed, 32), resolution=32, symmetry=symmetry, operators=operators)
     axis = game.guidance.axis
     assert axis is not None
     states = [game.initial()]
-    for before, action, after in play(game, seed, 20):
+    for before, action, after in play(game, seed, n_steps):
         assert_symmetric(after.mesh, axis)
         assert defects_of(after.mesh) == (0, 0) and is_valid(after.mesh)
         (again,) = game.transition_all(before, [action])

@@ -1,11 +1,17 @@
 """The operators of the preset `modeller`: known effects on known meshes, and every refusal."""
 
+from typing import Any
+
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from autopoly_env.mesh import PolyMesh, canonical_hash
-from autopoly_env.operators import OPERATORS
+from autopoly_env.errors import AutoPolyError, IllegalActionError
+from autopoly_env.mesh import PolyMesh, canonical_hash, validate
+from autopoly_env.operators import OPERATORS, ActionCodec
 from tests.helpers.operating import apply, edge, grid, legal, quad, refusal, two_quads
+from tests.helpers.strategies import random_walk
 
 
 def test_edge_cap__stands_half_as_high_as_its_edge_is_long() -> None:
@@ -207,3 +213,77 @@ def test_face_inset__refuses_a_face_that_is_not_convex() -> None:
     for mesh in (dart, star, tiny):
         assert legal("face_inset", mesh) == []
         assert "not convex or has no room" in refusal("face_inset", mesh, 0)
+
+
+def test_edge_fill__joins_two_parts() -> None:
+    corners = [(0, 0), (1, 0), (1, 1), (0, 1), (2, 0), (3, 0.5), (2, 1)]
+    mesh = PolyMesh.from_faces(corners, [(0, 1, 2, 3), (4, 5, 6)])
+    made = apply("edge_fill", mesh, edge(mesh, 1, 2), edge(mesh, 4, 6))
+    assert made.counts == (7, 9, 3)
+    assert made.topology.n_components == 1
+
+
+def test_edge_fill__makes_no_handle() -> None:
+    """The outer rim of a ring and the rim of its hole are never joined, for no mesh in the plane has a handle."""
+    mesh = ring()
+    assert "it would join two boundaries" in refusal("edge_fill", mesh, edge(mesh, 0, 1), edge(mesh, 9, 10))
+
+
+@settings(max_examples=40)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 25), st.sampled_from((0.0, 0.02)), st.data())
+def test_any_choice__makes_a_true_mesh_or_is_refused_in_a_line(
+    seed: int, n_steps: int, shake: float, data: st.DataObject
+) -> None:
+    mesh = random_walk(seed, "modeller", n_steps, shake)[-1].after
+    rim = np.flatnonzero(mesh.topology.is_boundary_edge).tolist()
+    ends = np.flatnonzero(mesh.topology.is_boundary_vertex).tolist()
+    for name, some in (("edge_fill", rim), ("vertex_merge", ends)):
+        element = data.draw(st.sampled_from(some))
+        for choice in some:
+            try:
+                made = OPERATORS[name].apply(mesh, element, choice)
+            except IllegalActionError as error:
+                assert str(error).startswith(f"{name} cannot work on ") and "\n" not in str(error)
+                continue
+            validate(made)
+            n_vertices, n_edges, n_faces = made.counts
+            assert n_vertices - n_edges + n_faces == made.topology.n_components - made.topology.n_holes
+            assert made.topology.is_boundary_edge.any()
+
+
+@pytest.mark.parametrize(
+    ("name", "element", "ids", "reason"),
+    [
+        ("edge_fill", 0, {"to": 3}, "expected the ends of the edge to fill to"),
+        ("edge_fill", 0, {"to": [2, 3], "at": 1}, "expected the ends of the edge to fill to"),
+        ("edge_fill", 0, {"to": [0, 2]}, "no edge joins vertices 0 and 2"),
+        ("edge_fill", 0, {"to": [0, 9]}, "vertex id 9 is not in this mesh"),
+        ("vertex_merge", 0, {"to": [2]}, "expected the vertex to merge with"),
+        ("vertex_merge", 0, {"to": True}, "expected the vertex to merge with"),
+        ("vertex_merge", 0, {"to": 9}, "vertex id 9 is not in this mesh"),
+        ("loop_cut", 0, {"slide": 0.5}, "expected an end of the edge and how far from it"),
+        ("loop_cut", 0, {"from": 2, "slide": 0.5}, "expected an end of the edge and how far from it"),
+        ("loop_cut", 0, {"from": 0, "slide": "0.5"}, "expected an end of the edge and how far from it"),
+    ],
+)
+def test_choice_in_a_file__that_is_none_is_told(name: str, element: int, ids: dict[str, Any], reason: str) -> None:
+    codec = OPERATORS[name].choice
+    assert codec is not None
+    with pytest.raises(AutoPolyError, match=reason):
+        codec.indices(quad(), element, ids)
+
+
+def test_slide_in_a_file__counts_from_either_end() -> None:
+    codec = OPERATORS["loop_cut"].choice
+    assert codec is not None
+    assert codec.indices(quad(), 0, {"from": 0, "slide": 0.25}) == 0.25
+    assert codec.indices(quad(), 0, {"from": 1, "slide": 0.25}) == 0.75
+    assert codec.ids(quad(), 0, 0.75) == {"from": 0, "slide": 0.75}
+
+
+def test_action_mask__knows_how_much_a_loop_and_an_inset_add() -> None:
+    mesh = PolyMesh.grid(2, 0.0, 0.0, 1.0, 1.0)  # 9 vertices; a loop adds 3, an inset 4
+    for room, loops, insets in ((11, 0, 0), (12, 12, 0), (13, 12, 4)):
+        codec = ActionCodec(("loop_cut", "face_inset"), room)
+        mask = codec.legal_mask(mesh)
+        assert [mask[codec.indices_of(name)].sum() for name in codec.operators] == [loops, insets]

@@ -222,7 +222,8 @@ def test_what_does_not_show__leaves_the_picture_as_it_is(mesh: PolyMesh, seed: i
         for action in legal_actions(mesh, OPERATORS)
         if not OPERATORS[action.operator].shows(mesh, action.element)
     ]
-    assert {a.operator for a in actions} <= {"edge_subdivide", "face_split", "edge_dissolve"}
+    silent = {"edge_subdivide", "face_split", "edge_dissolve", "loop_cut", "face_inset"}
+    assert {action.operator for action in actions} <= silent
     for action in actions[seed % 4 :: 4]:
-        ((_, after, _),) = starts(disagreement, action)
+        (_, after, _), *_ = starts(disagreement, action)
         np.testing.assert_allclose(coverage(after, 32), coverage(mesh, 32), atol=1e-12)

@@ -11,7 +11,7 @@ from autopoly_env.errors import SequenceError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence.deformation import ThinPlate
-from tests.helpers.constructions import house
+from tests.helpers.constructions import chapel, house
 from tests.helpers.sequences import gabled, walked
 from tests.helpers.tables import a_step, table
 
@@ -139,7 +139,11 @@ def test_edited__is_scored_against_its_own_last_mesh() -> None:
     assert edited.settings["scored_against"] == "its last mesh"
 
 
-@pytest.mark.parametrize("sequence", [house(), gabled(), walked(3), walked(5)], ids=str)
+@pytest.mark.parametrize(
+    "sequence",
+    [house(), gabled(), walked(3), walked(5), chapel(), *(walked(seed, 25, 0.0, "modeller") for seed in (0, 3, 5))],
+    ids=str,
+)
 def test_mirrored__has_every_mesh_mirrored_and_is_undone_by_itself(sequence: ConstructionSequence) -> None:
     image = sequence.mirrored()
     for mesh, other in zip(sequence.meshes(), image.meshes(), strict=True):

@@ -414,12 +414,24 @@ def test_folder__gives_the_same_image_for_a_seed_again_and_after_pickling(folder
         assert copy.sample(seed).name == source.sample(seed).name
 
 
-def test_folder__loads_an_image_when_it_is_asked_for_and_names_the_one_it_cannot_use(folder: Path) -> None:
+def test_folder__leaves_out_what_it_cannot_use_and_says_so(folder: Path) -> None:
     (folder / "broken.png").write_bytes(b"no image")
-    source = FolderTargets(folder)
-    with pytest.raises(SilhouetteError, match=r"broken\.png"):
-        for seed in range(6):
-            source.sample(seed)
+    Image.new("L", (9, 9)).save(folder / "black.png")
+    with pytest.warns(UserWarning, match=r"2 of 7 pictures .* left out: .*black\.png.*; .*broken\.png"):
+        source = FolderTargets(folder)
+    assert source.names == ("box0", "box1", "box2", "box3", "box4")
+    assert {source.sample(seed).name for seed in range(5)} == set(source.names)
+
+
+def test_folder__refuses_when_nothing_can_be_used(tmp_path: Path) -> None:
+    Image.new("L", (9, 9)).save(tmp_path / "black.png")
+    with pytest.raises(SilhouetteError, match=r"holds no picture with an object: .*black\.png"):
+        make_targets(tmp_path)
+
+
+def test_folder__takes_the_options_that_say_what_is_the_object(folder: Path) -> None:
+    dark = make_targets(folder, object="dark")
+    assert dark.sample(0).mask.sum() == 32 * 32 - make_targets(folder).sample(0).mask.sum()
 
 
 def test_folder__refuses_a_seed_out_of_range(folder: Path) -> None:
@@ -441,7 +453,7 @@ WRONG = {
         "construction, objects, shapenet or the path of a folder",
     ),
     "an unknown option": (lambda: make_targets("objects", family="mug"), "families, resolution"),
-    "an option for a folder": (lambda: make_targets(ROOT / "examples", resolution=64), "no options"),
+    "an option for a folder": (lambda: make_targets(ROOT / "examples", resolution=64), "folders have no option"),
     "an unknown split": (lambda: split_seed("validation", 0), "train or test"),
     "no difficulty": (lambda: ConstructionTargets(0), "from 1 to"),
     "a difficulty beyond all": (lambda: ConstructionTargets((1, 99)), "from 1 to"),

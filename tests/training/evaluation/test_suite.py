@@ -188,3 +188,14 @@ def test_curve__keeps_improvements_and_at_most_sixty() -> None:
     assert (points[0][0], points[0][2], points[-1][2]) == (10, 1.0, 199.0)
     assert all(a[0] < b[0] and a[1] <= b[1] and a[2] < b[2] for a, b in pairwise(points))
     assert Curve().points() == []
+
+
+def test_folder__takes_the_options_that_say_what_is_the_object(tmp_path: Path) -> None:
+    picture = Image.new("L", (32, 32), 255)
+    picture.paste(0, (8, 8, 24, 24))
+    picture.save(tmp_path / "box.png")
+    for given, area in (([], 256), (["targets.picture.object=light"], 32 * 32 - 256)):
+        [target] = find_suite(str(tmp_path), given).targets.targets()
+        assert target.load().mask.sum() == area
+    with pytest.raises(ConfigError, match="reddish"):
+        find_suite(str(tmp_path), ["targets.picture.object=reddish"])

@@ -270,6 +270,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Made:
     sequences = {"house": gabled()}
     sequences |= {f"game-{seed}": played(seed) for seed in range(20)}
     sequences |= {f"walk-{seed}": walked(seed, 60, (0.0, 0.002, 0.02)[seed % 3]) for seed in range(12)}
+    sequences |= {f"model-{seed}": walked(seed, 40, (0.0, 0.002, 0.02)[seed % 3], "modeller") for seed in range(24)}
     jobs = {}
     for name, sequence in sequences.items():
         options = {"depth": 0.1 * is_odd(name), "keyframes": name in ("house", "walk-2", "walk-3")}

@@ -1,0 +1,112 @@
+"""Parts, holes and small details of a picture: which of them a mesh has."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from autopoly_env.arrays import BoolArray, FloatArray, IntArray
+from autopoly_env.details.hairlines import FINEST
+from autopoly_env.mesh import PolyMesh
+from autopoly_env.raster import coverage
+from autopoly_env.silhouette import Silhouette, label_holes, label_parts
+
+_SMALL = 2  # pixels at FINEST: a place is a detail if this much can be taken off all around it
+
+
+@dataclass(frozen=True)
+class Details:
+    """What there is in a picture: a point (x, y) inside each of P parts and each of H holes."""
+
+    parts: FloatArray  # (P, 2) unit square
+    holes: FloatArray  # (H, 2)
+
+    @classmethod
+    def of(cls, silhouette: Silhouette) -> "Details":
+        """Those of a silhouette, as a tracer sees them: at its own resolution, at most 256. Asked again, the same."""
+        return _details_of(silhouette)
+
+    def kept(self, mesh: PolyMesh) -> tuple[int, int]:
+        """How many of the (parts, holes) the mesh has, each as a part or a hole of its own."""
+        loops = [mesh.vertices[loop] for loop in mesh.topology.boundary_loops]
+        areas = np.array([_signed_area(loop) for loop in loops])
+        parts, holes = (_innermost(points, loops, areas) for points in (self.parts, self.holes))
+        return len({k for k in parts if k >= 0 and areas[k] > 0.0}), len({k for k in holes if k >= 0 > areas[k]})
+
+
+@dataclass(frozen=True)
+class Losses:
+    """What of a picture a mesh has."""
+
+    n_parts: int
+    n_holes: int
+    n_parts_kept: int
+    n_holes_kept: int
+    n_places: int  # where mesh and picture differ by more than a seam, lost parts and holes among them
+
+    @classmethod
+    def of(cls, mesh: PolyMesh, silhouette: Silhouette) -> "Losses":
+        """Compare a mesh with a silhouette."""
+        details = Details.of(silhouette)
+        return cls(len(details.parts), len(details.holes), *details.kept(mesh), _n_places(mesh, silhouette))
+
+
+@lru_cache(maxsize=64)
+def _details_of(silhouette: Silhouette) -> Details:
+    shown = silhouette.target(min(silhouette.resolution, FINEST)).coverage
+    return Details(_middles(label_parts(shown)), _middles(label_holes(shown)))
+
+
+def _middles(labels: IntArray) -> FloatArray:
+    """For each label 1.. of a picture (R, R) the middle of its longest stretch along a row."""
+    size = len(labels)
+    begins = np.flatnonzero(np.diff(labels, axis=1, prepend=-1).ravel())  # every row begins anew
+    lengths, names = np.diff(begins, append=size * size), labels.ravel()[begins]
+    order = np.lexsort((-lengths, names))
+    order = order[names[order] > 0]
+    longest = order[np.flatnonzero(np.diff(names[order], prepend=0))]
+    rows, columns = np.divmod(begins[longest], size)
+    return np.column_stack((columns + 0.5 * lengths[longest], rows + 0.5)) / size
+
+
+def _eroded(mask: BoolArray) -> BoolArray:
+    """The pixels of a mask whose 4 neighbours are in it, too."""
+    around = np.pad(mask, 1)
+    kept: BoolArray = mask & around[:-2, 1:-1] & around[2:, 1:-1] & around[1:-1, :-2] & around[1:-1, 2:]
+    return kept
+
+
+def _innermost(points: FloatArray, loops: Sequence[FloatArray], areas: FloatArray) -> IntArray:
+    """(P,) of each point the smallest loop around it, -1 where there is none."""
+    inside = np.array([_contains(loop, points) for loop in loops])
+    sizes = np.where(inside, np.abs(areas)[:, None], np.inf)
+    return np.where(inside.any(axis=0), np.argmin(sizes, axis=0), -1)
+
+
+def _contains(loop: FloatArray, points: FloatArray) -> BoolArray:
+    """(P,) whether a closed polygon (n, 2) has each point inside."""
+    (ax, ay), (bx, by) = loop.T[:, :, None], np.roll(loop, -1, axis=0).T[:, :, None]
+    x, y = points.T
+    passes = (ay > y) != (by > y)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        left = x < ax + (y - ay) * (bx - ax) / (by - ay)
+    odd: BoolArray = (passes & left).sum(axis=0) % 2 == 1
+    return odd
+
+
+def _signed_area(loop: FloatArray) -> float:
+    x, y = loop.T
+    return float(0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1)))
+
+
+def _n_places(mesh: PolyMesh, silhouette: Silhouette) -> int:
+    """In how many places mesh and silhouette differ by more than a seam along the boundary."""
+    size = min(silhouette.resolution, FINEST)
+    wanted, shown = silhouette.target(size).mask, coverage(mesh, size) >= 0.5
+    n_places = 0
+    for differs in (wanted & ~shown, shown & ~wanted):
+        for _ in range(_SMALL * size // FINEST):
+            differs = _eroded(differs)
+        n_places += int(label_parts(differs.astype(np.float64)).max(initial=0))
+    return n_places

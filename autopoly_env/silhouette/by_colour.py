@@ -1,0 +1,117 @@
+"""The opinion of colour: the object is what differs from the background, or what is like a colour that was given."""
+
+import numpy as np
+
+from autopoly_env.arrays import BoolArray, Float32Array
+from autopoly_env.errors import SilhouetteError
+from autopoly_env.silhouette.background import Background, find_background
+from autopoly_env.silhouette.colours import hex_of, oklab, parse_colour
+from autopoly_env.silhouette.difference import STUDIED, beyond_cut, choose_cut
+from autopoly_env.silhouette.opinion import Opinion, View
+from autopoly_env.silhouette.options import ObjectOptions
+
+BLURRED = 0.7  # of the support of a sharp outline
+PRESENT, PRESENT_SHARE = 0.1, 1e-4  # a colour is in the picture if so many pixels are so close to it
+HOLLOW, LOWERED = 0.1, 0.02  # so much of an object is hole: worth a word, if a cut so low may find more of it
+LIKE = 0.12  # of the object's colour is what is this close to it, where nothing was said about the background
+
+
+def opinion(view: View) -> Opinion | None:
+    """What differs from most of the border; None where nothing does."""
+    background = find_background(view.features)
+    distances = background.distances(view.features)
+    cut = choose_cut(distances, background)
+    if cut is None:
+        return None
+    mask = beyond_cut(distances, cut.level)
+    if not mask.any() or mask.all():
+        return None
+    support = background.support * (1.0 if cut.is_sharp else BLURRED)
+    name = hex_of(background.colour)
+    if background.field is None:
+        notes = [f"object is what differs in colour from the background, {name}, by more than {cut.level:.2f}"]
+        remarks = []
+    else:
+        notes = [f"object is what differs by more than {cut.level:.2f} from a background whose light is uneven"]
+        remarks = ["warning: the light is uneven: is it a photo?"]
+    if not cut.is_sharp:
+        remarks.append("the outline is soft: --threshold says where it is cut")
+    enclosed = _enclosed_share(mask) if cut.level > LOWERED else 0.0
+    if enclosed > HOLLOW:
+        words = f"{enclosed:.0%} of what its outline encloses looks like the background"
+        remarks.append(f"{words}: --background '{name}' --threshold {LOWERED} takes more of it")
+    return Opinion(mask, tuple(notes), support, tuple(remarks), name, background.is_flat)
+
+
+def _enclosed_share(mask: BoolArray) -> float:
+    """The share of holes in what the outline encloses, judged on about STUDIED pixels a side."""
+    from scipy.ndimage import binary_fill_holes
+
+    step = max(1, max(mask.shape) // STUDIED)
+    small = mask[::step, ::step]
+    return 1.0 - float(small.sum()) / max(1, int(binary_fill_holes(small).sum()))
+
+
+def asked(label: str, view: View, options: ObjectOptions) -> Opinion:
+    """What differs from a colour that was given for the background, or is like one that was given for the object.
+
+    Raises SilhouetteError for a colour that is not in the picture.
+    """
+    for name, text in (("object", options.object_colour), ("background", options.background)):
+        if text is not None and not _is_present(view, text):
+            raise SilhouetteError(f"{label} shows no {text} (the {name} asked for); {_colours_of(view)}")
+    given = options.threshold
+    if options.object_colour is None:
+        assert options.background is not None
+        background = Background(_feature(view, options.background), None, 1.0, 0.02)
+        distances = background.distances(view.features)
+        cut = choose_cut(distances, background) if given is None else None
+        level = given if given is not None else cut.level if cut is not None else 0.0
+        mask = beyond_cut(distances, level) if given is None else distances > level
+        return Opinion(mask, (f"object is what differs from {options.background} by more than {level:.2f}",), 1.0)
+    near = _distances(view, options.object_colour)
+    if given is not None:
+        return Opinion(near <= given, (f"object is what is within {given:.2f} of {options.object_colour}",), 1.0)
+    if options.background is not None:
+        far, other = _distances(view, options.background), options.background
+    else:
+        far, other = _distance_from_background(view, near)
+    if other:
+        said = f"object is what is closer to {options.object_colour} than to the background, {other}"
+        return Opinion(near < np.minimum(far, 0.5 * near.max()), (said,), 1.0)
+    return Opinion(near <= LIKE, (f"object is what is within {LIKE:.2f} of {options.object_colour}",), 1.0)
+
+
+def _distance_from_background(view: View, near: Float32Array) -> tuple[Float32Array, str]:
+    """How far every pixel is from the background, and its name; no name where that is the object's own colour."""
+    background = find_background(view.features)
+    far = background.distances(view.features)
+    is_own = float(near[far <= far.min() + 0.02].min()) < LIKE
+    return far, "" if is_own else hex_of(background.colour)
+
+
+def _feature(view: View, text: str) -> Float32Array:
+    lab = oklab(np.array(parse_colour(text), dtype=np.uint8))
+    return lab[: view.features.shape[2]]
+
+
+def _distances(view: View, text: str) -> Float32Array:
+    """How far every pixel is from a colour."""
+    return Background(_feature(view, text), None, 1.0, 0.0).distances(view.features)
+
+
+def _is_present(view: View, text: str) -> bool:
+    lab = oklab(np.array(parse_colour(text), dtype=np.uint8))
+    if view.is_grey and float(np.hypot(lab[1], lab[2])) > PRESENT:
+        return False
+    close = _distances(view, text) < PRESENT
+    return bool(close.sum() >= max(1, PRESENT_SHARE * close.size))
+
+
+def _colours_of(view: View) -> str:
+    """The colours that a picture mostly has, as advice."""
+    points = view.features.reshape(-1, view.features.shape[2])
+    points = points[:: max(1, len(points) // 4096)]
+    _, first, counts = np.unique(np.rint(points * 10), axis=0, return_index=True, return_counts=True)
+    names = [hex_of(points[first[i]]) for i in np.argsort(-counts, kind="stable")[:4]]
+    return f"it mostly has {', '.join(dict.fromkeys(names))}: give one of these"

@@ -1,0 +1,108 @@
+"""What hangs together in a picture: parts and holes, and where two parts meet in nothing but the corner of a pixel.
+
+Pixels hang together with their 8 neighbours, as a line one pixel wide does, and the background with its 4. Two parts
+that are wider than a line and meet in a corner only stay two: nothing of a width joins them.
+
+Letters: R pixels a side.
+"""
+
+import numpy as np
+
+from autopoly_env.arrays import AnyArray, BoolArray, FloatArray, IntArray
+
+LEVEL = 0.4990123  # of coverage, about half; a pixel covered by just this much would make contours touch, and none is
+
+
+def torn_corners(coverage: FloatArray) -> BoolArray:
+    """Mask (R-1, R-1) of the corners between four pixels where two filled ones meet diagonally and are apart.
+
+    They do unless they are of two parts, neither of them one pixel wide there, or are so faint that a surface through
+    the four values is below the level in the middle (the asymptotic decider of Nielson and Hamann 1991).
+    """
+    filled = coverage > LEVEL
+    thick = _thick(filled)
+    parts = _areas(filled)
+    torn = np.zeros((len(coverage) - 1, len(coverage) - 1), np.bool_)
+    for falling in (True, False):
+        (a, b), (c, d) = _diagonals(coverage, falling=falling)
+        meets = (a > LEVEL) & (b > LEVEL) & (c <= LEVEL) & (d <= LEVEL)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            faint = meets & ((a * b - c * d) / (a + b - c - d) < LEVEL)
+        (first, second), _ = _diagonals(parts, falling=falling)
+        (is_thick, is_too), _ = _diagonals(thick, falling=falling)
+        torn |= meets & (faint | ((first != second) & is_thick & is_too))
+    return torn
+
+
+def label_parts(coverage: FloatArray) -> IntArray:
+    """The parts, 1.., of a picture of coverages (R, R); 0 is background."""
+    filled = coverage > LEVEL
+    return _joined(_areas(filled), filled, ~torn_corners(coverage))
+
+
+def label_holes(coverage: FloatArray) -> IntArray:
+    """The holes, 1.., of a picture of coverages (R, R): background that does not reach the border; 0 elsewhere."""
+    padded = np.pad(coverage, 1)
+    empty = padded <= LEVEL
+    labels = _joined(_areas(empty), empty, torn_corners(padded))
+    names, numbers = np.unique(np.where(labels == labels[0, 0], 0, labels), return_inverse=True)
+    assert names[0] == 0  # the background around
+    return numbers.reshape(labels.shape)[1:-1, 1:-1]
+
+
+def is_slanting_line(mask: BoolArray) -> bool:
+    """Whether a mask (R, R) is nothing but lines one pixel wide, some of which hang together by corners alone."""
+    if _thick(mask).any():
+        return False
+    return int(_areas(mask).max()) > int(label_parts(mask.astype(np.float64)).max())
+
+
+def _areas(among: BoolArray) -> IntArray:
+    """Labels of the areas, 1.., that hang together by 4 neighbours; 0 elsewhere."""
+    from skimage.measure import label
+
+    labels: IntArray = label(among, connectivity=1)
+    return labels
+
+
+def _joined(labels: IntArray, among: BoolArray, open_corners: BoolArray) -> IntArray:
+    """The labels, those of areas that meet across an open corner made the same, and numbered anew from 1."""
+    pairs = []
+    for falling in (True, False):
+        (a, b), (c, d) = _diagonals(among, falling=falling)
+        meets = a & b & ~c & ~d & open_corners
+        (first, second), _ = _diagonals(labels, falling=falling)
+        pairs.append(np.stack((first[meets], second[meets])))
+    groups = _groups(int(labels.max()) + 1, *np.concatenate(pairs, axis=1))
+    joined: IntArray = np.unique(groups, return_inverse=True)[1][labels]
+    return joined
+
+
+def _groups(n: int, first: IntArray, second: IntArray) -> IntArray:
+    """For each of 0..n-1 the least that it is joined to, on any way, by the pairs of `first` and `second`."""
+    group = np.arange(n)
+    while True:
+        ends = group[first], group[second]
+        low, after = np.minimum(*ends), group.copy()
+        for end in ends:
+            np.minimum.at(after, end, low)
+        after = after[after]
+        if np.array_equal(after, group):
+            return group
+        group = after
+
+
+def _diagonals(grid: AnyArray, *, falling: bool) -> tuple[tuple[AnyArray, AnyArray], tuple[AnyArray, AnyArray]]:
+    """The two pixels on one diagonal of every corner between four pixels, and the two on the other."""
+    pairs = (grid[:-1, :-1], grid[1:, 1:]), (grid[:-1, 1:], grid[1:, :-1])
+    return pairs if falling else pairs[::-1]
+
+
+def _thick(filled: BoolArray) -> BoolArray:
+    """The pixels of 2 x 2 filled blocks."""
+    blocks = filled[:-1, :-1] & filled[:-1, 1:] & filled[1:, :-1] & filled[1:, 1:]
+    thick = np.zeros_like(filled)
+    for rows in (slice(None, -1), slice(1, None)):
+        for columns in (slice(None, -1), slice(1, None)):
+            thick[rows, columns] |= blocks
+    return thick

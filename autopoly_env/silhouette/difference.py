@@ -1,0 +1,110 @@
+"""What differs from the background: how much is enough, and where a soft edge is cut."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from autopoly_env.arrays import BoolArray, Float32Array
+from autopoly_env.silhouette.background import Background
+
+LEAST = 0.012  # no smaller difference is told from none
+USUAL = 0.07  # from here on something is there, if nothing speaks against it
+EXACT = 0.004  # a flat background with no more noise is a drawing's: whatever differs from it at all is there
+DUST = 3  # more parts at the lowest cut than at the usual one: it is no drawing, but a JPEG of one
+PALE = 0.35  # of the strongest difference: a paler object has a lower cut
+STUDIED = 256  # pixels a side, about: the cut is chosen on so many
+STEP = 1.35  # between cuts that are tried
+HIGHEST = 0.65  # of the strongest difference: no higher cut is tried
+SOFT = 0.35  # pixels (of 256 a side) that an outline may give way when the cut is lowered by a quarter
+SHARP = 0.45  # the same in pixels of its own, of a picture so small that these are larger
+PEELED = 2  # pixels of a soft edge that are taken off at most
+
+
+@dataclass(frozen=True)
+class Cut:
+    """Where the differences are cut: `level`, how soft the outline is there (pixels of 256 a side), if not too soft."""
+
+    level: float
+    softness: float
+    is_sharp: bool
+
+
+def choose_cut(distances: Float32Array, background: Background) -> Cut | None:
+    """The lowest level above the noise at which the outline is sharp: a soft shadow around an object is not in it.
+
+    None where nothing differs from the background.
+    """
+    step = max(1, max(distances.shape) // STUDIED)
+    small = distances[::step, ::step]
+    noise = max(LEAST, 1.3 * background.noise)
+    beyond = small[small > noise]
+    if not len(beyond):
+        beyond = distances[distances > noise]
+        small = distances
+    if not len(beyond):
+        return None
+    strongest = float(np.quantile(beyond, 0.9))
+    level = max(noise, min(USUAL, PALE * strongest))
+    if background.is_flat and background.noise <= EXACT and not _is_dusty(small, noise, level):
+        level = noise
+    best: Cut | None = None
+    while best is None or level <= HIGHEST * strongest:
+        softness, limit = _softness(small, level)
+        cut = Cut(level, softness, softness <= limit)
+        if cut.is_sharp:
+            return cut
+        if best is None or softness < best.softness:
+            best = cut
+        level *= STEP
+    return best
+
+
+def _is_dusty(distances: Float32Array, noise: float, level: float) -> bool:
+    """Whether parts of their own lie between the noise and the usual cut: what lossy compression leaves at edges."""
+    from skimage.measure import label
+
+    faint, usual = (label(distances > cut, connectivity=2, return_num=True)[1] for cut in (noise, level))
+    return int(faint) - int(usual) > DUST
+
+
+def beyond_cut(distances: Float32Array, level: float) -> BoolArray:
+    """The mask (H, W) of what lies beyond the cut, its antialiased edge cut where it is half as different as inside."""
+    mask: BoolArray = distances > level
+    height, width = mask.shape
+    for _ in range(PEELED):
+        rows, columns = np.nonzero(_outermost(mask))
+        if not len(rows):
+            break
+        strongest = distances[rows, columns]
+        for down in range(-2, 3):
+            for right in range(-2, 3):
+                beside = (np.clip(rows + down, 0, height - 1), np.clip(columns + right, 0, width - 1))
+                strongest = np.maximum(strongest, distances[beside])
+        soft = distances[rows, columns] < 0.5 * strongest
+        if not soft.any():
+            break
+        mask[rows[soft], columns[soft]] = False
+    return mask
+
+
+def _outermost(mask: BoolArray) -> BoolArray:
+    """Pixels of the mask that have one beside them that is not in it; beyond the picture everything is."""
+    inside = mask.copy()
+    inside[1:] &= mask[:-1]
+    inside[:-1] &= mask[1:]
+    inside[:, 1:] &= mask[:, :-1]
+    inside[:, :-1] &= mask[:, 1:]
+    return mask & ~inside
+
+
+def _softness(distances: Float32Array, level: float) -> tuple[float, float]:
+    """How many pixels (of 256 a side) an outline gives way, on average, if the cut is a quarter lower; the limit."""
+    from scipy.ndimage import binary_fill_holes
+
+    outline = binary_fill_holes(distances > level)
+    wider = binary_fill_holes(distances > 0.75 * level)
+    length = int(_outermost(outline).sum())
+    if not length:
+        return (0.0 if outline.all() else np.inf), SOFT
+    scale = STUDIED / max(distances.shape)
+    return (int(wider.sum()) - int(outline.sum())) / length * scale, max(SOFT, SHARP * scale)

@@ -1,0 +1,56 @@
+"""What a mesh has of a picture's parts, holes and small details."""
+
+import numpy as np
+import shapely
+
+from autopoly_env.details import Details, Losses
+from autopoly_env.mesh import PolyMesh
+from tests.helpers.drawings import painted
+
+SIZE = 64
+TWO_HOLES = shapely.box(0.1, 0.1, 0.9, 0.9) - shapely.box(0.2, 0.2, 0.4, 0.4) - shapely.box(0.6, 0.6, 0.8, 0.8)
+
+
+def boxes(*sides: tuple[float, float, float, float]) -> PolyMesh:
+    """Quads of their own."""
+    points = [corner for x0, y0, x1, y1 in sides for corner in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))]
+    return PolyMesh.from_faces(np.array(points), [tuple(range(4 * k, 4 * k + 4)) for k in range(len(sides))])
+
+
+def framed(x0: float, y0: float, x1: float, y1: float) -> PolyMesh:
+    """The box 0.1 to 0.9 with a hole, as two faces."""
+    outer = [(0.1, 0.1), (0.9, 0.1), (0.9, 0.9), (0.1, 0.9)]
+    hole = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
+    return PolyMesh.from_faces(np.array(outer + hole), [(0, 1, 2, 6, 5, 4), (2, 3, 0, 4, 7, 6)])
+
+
+def test_details__have_a_point_in_every_part_and_hole() -> None:
+    silhouette = painted(shapely.union_all([TWO_HOLES, shapely.box(0.27, 0.27, 0.33, 0.33)]), SIZE)
+    details = Details.of(silhouette)
+    assert (len(details.parts), len(details.holes)) == (2, 2)
+    for points, value in ((details.parts, True), (details.holes, False)):
+        columns, rows = np.floor(points * SIZE).astype(int).T
+        assert (silhouette.mask[rows, columns] == value).all()
+    assert Details.of(silhouette) is details
+
+
+def test_kept__counts_parts_and_holes_that_the_mesh_has_for_its_own() -> None:
+    details = Details.of(painted(TWO_HOLES, SIZE))
+    assert details.kept(boxes((0.1, 0.1, 0.9, 0.9))) == (1, 0)
+    assert details.kept(framed(0.2, 0.2, 0.4, 0.4)) == (1, 1)
+    assert details.kept(framed(0.15, 0.15, 0.85, 0.85)) == (1, 1)  # one hole about both is one
+
+
+def test_kept__does_not_count_parts_that_are_one_in_the_mesh() -> None:
+    details = Details.of(painted(shapely.box(0.1, 0.1, 0.3, 0.9) | shapely.box(0.6, 0.1, 0.9, 0.9), SIZE))
+    assert details.kept(boxes((0.1, 0.1, 0.9, 0.9))) == (1, 0)
+    assert details.kept(boxes((0.1, 0.1, 0.3, 0.9), (0.6, 0.1, 0.9, 0.9))) == (2, 0)
+    assert details.kept(boxes((0.1, 0.1, 0.3, 0.9))) == (1, 0)
+
+
+def test_losses__count_places_that_differ_by_more_than_a_seam() -> None:
+    back = shapely.box(0.125, 0.5, 0.875, 0.875)
+    teeth = [shapely.box(x, 0.25, x + 0.0625, 0.5) for x in (0.125, 0.25, 0.375, 0.5, 0.625, 0.75)]
+    comb = painted(shapely.union_all([back, *teeth]), 256)
+    assert Losses.of(boxes((0.125, 0.5, 0.875, 0.875)), comb) == Losses(1, 0, 1, 0, 6)
+    assert Losses.of(boxes((0.12, 0.5, 0.88, 0.875)), painted(back, 256)) == Losses(1, 0, 1, 0, 0)
