@@ -48,7 +48,7 @@ class QuadsAgent(WholeAgent):
         self._config = config
 
     def check(self, simulator: Simulator) -> None:
-        """As every agent; raises ConfigError, too, where quads cannot be told with the operators, or faces may be any."""
+        """As every agent; raises ConfigError also where the operators cannot tell quads, or faces may be any."""
         super().check(simulator)
         missing = [name for name in OPERATORS if name not in simulator.operators]
         if missing:
