@@ -14,6 +14,7 @@ from autopoly_env.score import Score
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.simulator import Simulator
 
+_AT_THE_START = 2  # refits of the rectangle that a game begins with, which are nobody's
 _PARTS = {"sequence": ConstructionSequence, "mesh": PolyMesh, "score": Score, "stats": Stats}
 
 
@@ -46,7 +47,7 @@ def solved(
 def _counted(solution: Solution, n_refits: int, budget: Budget | None) -> Solution:
     """The solution with the refits that the simulator has counted, where these are more than the agent has."""
     stats = solution.stats
-    if n_refits <= stats.n_refits:
+    if n_refits <= max(stats.n_refits, _AT_THE_START):
         return solution
     limit = None if budget is None else budget.refits
     is_over = limit is not None and n_refits > limit

@@ -112,11 +112,11 @@ def count_hairlines(points: FloatArray, edges: IntArray, on_rim: BoolArray, gap:
 @kernel
 def defects(
     points: FloatArray, edges: IntArray, on_rim: BoolArray, corners: IntArray, offsets: IntArray
-) -> tuple[int, int]:
-    """(crossings and hairlines, flipped or empty faces) of a mesh; a crossing that rounding decides counts."""
+) -> tuple[int, int, int]:
+    """(crossings, hairlines, flipped or empty faces) of a mesh; a crossing that rounding decides counts."""
     certain, uncertain = count_crossings(points, edges)
     flipped = 0
     for area in face_areas(points, corners, offsets):
         if not area > _MIN_FACE_AREA:
             flipped += 1
-    return certain + uncertain + count_hairlines(points, edges, on_rim, CLEARANCE), flipped
+    return certain + uncertain, count_hairlines(points, edges, on_rim, CLEARANCE), flipped

@@ -12,10 +12,10 @@ def defects_of(mesh: PolyMesh, faces: FaceRule = "any") -> tuple[int, int]:
     corridor or a slit that shows in no picture, or two vertices as good as in one place.
     """
     topology = mesh.topology
-    crossings, flipped = geometry_kernels.defects(
+    crossings, hairlines, flipped = geometry_kernels.defects(
         mesh.vertices, topology.edges, topology.is_boundary_edge, topology.corners, topology.face_offsets
     )
-    return int(crossings), int(flipped) + len(broken_faces(mesh, faces))
+    return int(crossings) + int(hairlines), int(flipped) + len(broken_faces(mesh, faces))
 
 
 def is_sane(mesh: PolyMesh, faces: FaceRule = "any") -> bool:

@@ -75,7 +75,7 @@ def _cost(
             one, two = pairs[v, w], pairs[face[m], face[m + 1]]
             if one >= 0 and two >= 0 and labels[one, 0] != labels[two, 0] and labels[one, 1] == labels[two, 1]:
                 return np.inf  # it would join two loops of one part, which is a handle
-    if n_new == 0 and (labels[:, 1] == labels[i, 1]).sum() == n:  # no boundary would be left
+    if n_new == 0 and _n_around(labels, pairs, face) == n:  # no boundary would be left
         return np.inf
     if not _is_clear(vertices, edges, face, pairs):
         return np.inf
@@ -83,6 +83,18 @@ def _cost(
     for k in range(1, n - 1):
         area += 0.5 * _turn(vertices, face[0], face[k], face[k + 1])
     return new / area
+
+
+@kernel
+def _n_around(labels: IntArray, pairs: IntArray, face: IntArray) -> int:
+    """How many boundary half-edges the parts have that a face of boundary sides alone lies between."""
+    n, n_rows = len(face), 0
+    for part in labels[:, 1]:
+        for k in range(n):
+            if labels[pairs[face[k], face[(k + 1) % n]], 1] == part:
+                n_rows += 1
+                break
+    return n_rows
 
 
 @kernel

@@ -17,6 +17,7 @@ from autopoly_env.refit.shape_kernels import (
     LOW,
     MOST_CROSSINGS,
     MOST_FLIPPED,
+    MOST_HAIRLINES,
     N_EVALUATIONS,
     Progress,
     Settings,
@@ -37,7 +38,7 @@ def refit(
     """Fit all vertices to the target; write (V, 2) `result`; return (loss before, loss after, evaluations).
 
     The loss is the sum of squared coverage errors at the last, finest picture of `pyramid`. The result has no larger
-    loss than the start, and no more crossings or flipped faces unless `settings.keep_defects` is true.
+    loss than the start, and no more crossings, hairlines or flipped faces unless `settings.keep_defects` is true.
     """
     n = shape.boundary.shape[0]
     unknowns, scratch = np.empty((n, 2)), np.empty((n, 2))
@@ -48,9 +49,10 @@ def refit(
             unknowns[k, axis] = start[v, axis]
             low, high = min(low, start[v, axis]), max(high, start[v, axis])
     fine = pyramid[len(pyramid) - 1]
-    crossings, flipped = defects(start, shape.edges, shape.on_rim, shape.corners, shape.offsets)
-    best = Progress(start, start.copy(), np.empty_like(start), np.zeros(6))
+    crossings, hairlines, flipped = defects(start, shape.edges, shape.on_rim, shape.corners, shape.offsets)
+    best = Progress(start, start.copy(), np.empty_like(start), np.zeros(7))
     best.record[MOST_CROSSINGS] = 1e9 if settings.keep_defects else crossings
+    best.record[MOST_HAIRLINES] = 1e9 if settings.keep_defects else hairlines
     best.record[MOST_FLIPPED] = 1e9 if settings.keep_defects else flipped
     best.record[LOW], best.record[HIGH] = low, high
     loss_before = loss_at(unknowns, shape, fine, work, scratch)

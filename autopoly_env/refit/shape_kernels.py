@@ -61,13 +61,12 @@ class Progress(NamedTuple):
     start: FloatArray  # (V, 2)
     points: FloatArray  # (V, 2) of the best
     trial: FloatArray  # (V, 2) scratch
-    record: (
-        FloatArray  # (6,) LOSS at the current level, MOST_CROSSINGS and MOST_FLIPPED faces, N_EVALUATIONS, LOW, HIGH
-    )
+    record: FloatArray  # (7,) LOSS at the current level, MOST_..., N_EVALUATIONS, LOW, HIGH
 
 
 LOSS, MOST_CROSSINGS, MOST_FLIPPED, N_EVALUATIONS = 0, 1, 2, 3
 LOW, HIGH = 4, 5  # of the box that positions stay in
+MOST_HAIRLINES = 6
 
 
 @kernel
@@ -159,8 +158,9 @@ def spread(unknowns: FloatArray, shape: Shape, best: Progress) -> None:
 def offer(unknowns: FloatArray, shape: Shape, loss: float, best: Progress) -> bool:
     """Keep the mesh if it is sane and its loss is the least so far; say whether it is sane."""
     spread(unknowns, shape, best)
-    crossings, flipped = defects(best.trial, shape.edges, shape.on_rim, shape.corners, shape.offsets)
+    crossings, hairlines, flipped = defects(best.trial, shape.edges, shape.on_rim, shape.corners, shape.offsets)
     sane = crossings <= best.record[MOST_CROSSINGS] and flipped <= best.record[MOST_FLIPPED]
+    sane = sane and hairlines <= best.record[MOST_HAIRLINES]
     sane = sane and keeps_rule(shape, best.trial, best.start)
     if sane and loss < best.record[LOSS]:
         best.record[LOSS] = loss

@@ -50,7 +50,7 @@ def tune(
     """
     size = pixels.mask.shape[0]
     inside, filled = overlap_counts_in_rows(points, edges, pixels, work, 0, size)
-    crossings, flipped = defects(points, shape.edges, shape.on_rim, shape.corners, shape.offsets)
+    crossings, hairlines, flipped = defects(points, shape.edges, shape.on_rim, shape.corners, shape.offsets)
     start = points.copy()
     for step in _STEPS:
         for _round in range(_N_ROUNDS):
@@ -77,10 +77,10 @@ def tune(
                     gain_inside, gain_filled = new_inside - part_inside, new_filled - part_filled
                     iou = _iou(inside + gain_inside, filled + gain_filled, n_filled)
                     if iou > _iou(inside, filled, n_filled) + _LEAST_GAIN:
-                        now_crossings, now_flipped = defects(
+                        now_crossings, now_hairlines, now_flipped = defects(
                             points, shape.edges, shape.on_rim, shape.corners, shape.offsets
                         )
-                        sane = now_crossings <= crossings and now_flipped <= flipped
+                        sane = now_crossings <= crossings and now_hairlines <= hairlines and now_flipped <= flipped
                         if sane and keeps_rule(shape, points, start):
                             inside, filled = inside + gain_inside, filled + gain_filled
                             n_moved += 1

@@ -30,7 +30,7 @@ from training import evaluate
 
 CHAIR = ROOT / "examples" / "chair.png"
 QUICK = ("--resolution", 32, "--refits", 20, "--quiet")
-(HASTY, CHECK) = re.findall(
+HASTY, CHECK, *_ = re.findall(
     r"```python\n(.*?)```", (ROOT / "docs" / "agents.md").read_text(encoding="utf-8"), re.DOTALL
 )
 

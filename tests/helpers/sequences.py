@@ -1,5 +1,6 @@
 """Construction sequences for tests of what replays them: an example by hand, random walks, games in the simulator."""
 
+from dataclasses import replace
 from typing import Any
 
 from agents.baselines.random_agent import RandomAgent, RandomConfig
@@ -45,6 +46,7 @@ def played(seed: int, n_steps: int = 25) -> ConstructionSequence:
         try:
             states.append(simulator.transition(states[-1], agent.act(simulator, states[-1]).action))
         except IllegalActionError:  # it has no room
-            states[-1] = simulator.idle(states[-1])
+            last, idle = states[-1], simulator.idle(states[-1])
+            states[-1] = replace(idle, action=last.action, choice=last.choice, halfway=last.halfway)
     steps = [(state.action, state.choice, state.mesh, SCORE) for state in states[1:] if state.action is not None]
     return ConstructionSequence.record({"target": f"noise {seed}"}, states[0].mesh, SCORE, steps)

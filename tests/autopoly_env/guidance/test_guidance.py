@@ -33,7 +33,7 @@ LOPSIDED = polygon([(0.1, 0.1), (0.9, 0.2), (0.8, 0.8), (0.2, 0.9)])
         ({"start": START, "operators": "weld"}, "weld"),
         ({"symmetry": 0.0}, "well inside"),
         ({"symmetry": 1.2}, "well inside"),
-        ({"symmetry": float("nan")}, "well inside"),
+        ({"symmetry": float("nan")}, "expected a number"),
         ({"importance": np.zeros((4, 4))}, "black all over"),
         ({"importance": np.full((4, 4), np.nan)}, "NaN"),
         ({"importance": np.full((4, 4), -0.5)}, "spans -0.5"),

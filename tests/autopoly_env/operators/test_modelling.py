@@ -68,6 +68,16 @@ def test_edge_fill__makes_a_triangle_where_two_edges_share_a_corner() -> None:
     assert OPERATORS["edge_fill"].choose(mesh, first) == second
 
 
+def test_edge_fill__closes_a_gap_between_three_parts_that_touch_in_corners() -> None:
+    corners = [(0.4, 0.4), (0.6, 0.4), (0.5, 0.6), (0.5, 0.2), (0.8, 0.6), (0.2, 0.6)]
+    mesh = PolyMesh.from_faces(corners, [(1, 0, 3), (2, 1, 4), (0, 2, 5)])  # each all boundary, three sides of it
+    rim = [edge(mesh, *e) for e in ((0, 1), (1, 2), (0, 2))]
+    assert set(rim) <= set(legal("edge_fill", mesh))
+    for first in rim:
+        made = apply("edge_fill", mesh, first)
+        assert made.counts == (6, 9, 4) and set(made.faces[-1]) == {0, 1, 2}
+
+
 def test_edge_fill__prefers_the_narrowest_gap() -> None:
     left, near, far = (PolyMesh.rectangle(x, 0, x + 0.1, 0.5).vertices for x in (0.0, 0.2, 0.5))
     mesh = PolyMesh.from_faces(np.vstack((left, near, far)), [(0, 1, 2, 3), (4, 5, 6, 7), (8, 9, 10, 11)])

@@ -124,7 +124,7 @@ def test_refit__leaves_the_idle_side_where_it_is() -> None:
         np.testing.assert_allclose(moved[[2, 3]], SQUARE.vertices[[2, 3]] + (2.0 / 64, 0.0), rtol=0, atol=1e-6)
 
 
-@pytest.mark.parametrize("box", [(0.3, 0.35, 0.9, 0.95), (0.05, 0.05, 0.25, 0.25), (0.0, 0.0, 1.0, 1.0)])
+@pytest.mark.parametrize("box", [(0.3, 0.35, 0.9, 0.95), (0.05, 0.05, 0.3, 0.3), (0.0, 0.0, 1.0, 1.0)])
 def test_refit__takes_inner_vertices_along(box: tuple[float, float, float, float]) -> None:
     grid, target = PolyMesh.grid(3, 0.2, 0.2, 0.6, 0.6), target_of(PolyMesh.rectangle(*box), 64)
     after = refit(grid, target).mesh
