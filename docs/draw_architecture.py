@@ -26,7 +26,7 @@ TABLES = {
         commands: what commands share: progress, results, Ctrl-C, wishes
         registry: agents by name; from outside by my.module:Agent
         guided: nFAP-Net and WarpNet in the search | rl: policies: observation, network, environments
-        search: Monte Carlo tree search; mcts, the default
+        search: Monte Carlo tree search; mcts, the default | quads: outlines cut into quads
         climb: hill climbing on outlines | retell: a construction told again | conformance: checks agents
         trace: best polygons of contours | baselines: random, beam, greedy, ... | entry: options | contract: is it kept
         base: what every agent is: act and solve
