@@ -202,7 +202,7 @@ def test_out__without_an_ending_is_a_folder_for_one_as_well(run: Run) -> None:
             "step 1: moved.1.1: Input should be a valid number",
         ),
         (lambda data: data["steps"][0].pop("score"), "step 1: score: Field required"),
-        (lambda data: data.update(version=2), "the version is 2; this release reads version 1"),
+        (lambda data: data.update(version=3), "the version is 3; this release reads versions 1 and 2"),
         (lambda data: data.update(format="tale"), "the format is 'tale'"),
     ],
 )

@@ -279,7 +279,7 @@ def test_max_steps_and_refits__limit_the_work(run: Run) -> None:
         (["box.png", "--resolution", "4"], "expected 8 to 1024"),
         (["box.png", "--w-sc", "-1"], "w_sc = -1.0"),
         (["box.png", "--refits", "-1"], "a budget of -1 refits"),
-        (["box.png", "--max-steps", "-1"], "max_steps -1"),
+        (["box.png", "--max-steps", "-1"], "max_steps=-1"),
         (["box.png", "--option", "width"], "--option width: expected key=value, such as width=4"),
         (["box.png", "--option", "width=[4"], "--option width=[4: the value is not YAML"),
         (["box.png", "--option", "name=3"], "agent 'mcts' has no option 'name'"),

@@ -466,7 +466,7 @@ def test_broken_record__is_named_by_its_line(run: Run) -> None:
         (["tiny.yaml", "--workers", "0"], "0 workers: expected at least 1"),
         (["tiny.yaml", "--ray-address", "auto"], "a Ray address is of no use to the engine 'serial'"),
         (["tiny.yaml", "--budget", "hours=1"], "--budget hours=1: expected refits=N or seconds=N"),
-        (["tiny.yaml", "--shard", "0/2"], "--shard 0/2: expected k/n with 1 <= k <= n"),
+        (["tiny.yaml", "--shard", "0/2"], "--shard '0/2': expected k/n with 1 <= k <= n"),
         (["tiny.yaml", "--set", "targets.n=0"], "suite tiny has no targets"),
         (["tiny.yaml", "--baseline", "nobody"], "baseline 'nobody' is no label of the suite"),
         (["tiny.yaml", "--resume", "--fresh"], "--resume and --fresh: give one of them"),

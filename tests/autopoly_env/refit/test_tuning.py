@@ -6,14 +6,14 @@ import pytest
 from autopoly_env.mesh import PolyMesh, is_sane
 from autopoly_env.refit import Bonds, tune
 from autopoly_env.score import intersection_over_union
-from autopoly_env.silhouette import Silhouette, Target
+from autopoly_env.silhouette import Target
 
 
 def target() -> Target:
-    """A 40 x 40 picture with a rectangle over rows 8..31 and columns 10..29."""
-    mask = np.zeros((40, 40), np.bool_)
-    mask[8:32, 10:30] = True
-    return Silhouette(mask).target(40)
+    """40 x 40 pixels with a rectangle over rows 8..31 and columns 10..29, scored by counting them."""
+    coverage = np.zeros((40, 40))
+    coverage[8:32, 10:30] = 1.0
+    return Target(coverage)
 
 
 def box(x0: float, y0: float, x1: float, y1: float) -> PolyMesh:

@@ -450,7 +450,7 @@ def test_load__refuses_files_that_are_missing_no_image_or_cut_short(tmp_path: Pa
     }
     for file_name, finding in findings.items():
         message = refusal(tmp_path / file_name)
-        assert finding in message and str(tmp_path / file_name) in message
+        assert finding in message and str(tmp_path / file_name)[:100] in message
 
 
 # --- find_images ---
