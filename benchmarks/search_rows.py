@@ -39,7 +39,7 @@ VARIANTS: dict[str, tuple[Any, ...]] = {
     "halving": (False, True),
     "reuse_tree": (True, False),
     "merge": (True, False),
-    "seeds": ((), ("trace",), ("climb",), ("climb", "decimate")),
+    "seeds": ((), ("trace",), ("climb",), ("trace", "climb", "decimate", "quads")),
     "hop_patience": (0, 60, 1000),
 }
 
