@@ -45,8 +45,8 @@ What in a picture is the object (docs/pictures-in.md) the notes tell; --object, 
 \b
 Guidance (docs/guidance.md): --importance is for every agent; --start, --lock
 and --symmetry are for those that play step by step: all but trace, climb,
-decimate, dr-simple and dr-complex. --faces convex or quads is for all but
-trace, climb and decimate.
+decimate, quads, dr-simple and dr-complex. --faces convex or quads is for all
+but trace, climb and decimate.
 
 \b
 Printed are the scores, at each image's own resolution, and the picture to open:

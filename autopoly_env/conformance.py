@@ -179,8 +179,8 @@ def _written(made: Format, export: Export, path: Path, where: str) -> None:
 def check_env(env: Any, n_steps: int = 60, seed: int = 0) -> None:
     """Check of an AutoPoly environment, wrapped or not, what Gymnasium's own `check_env` does not.
 
-    Rules: STOP is always legal; an action that the mask forbids is invalid and leaves the shape alone; so does one that
-    it allows and that has no room, which it forbids from then on; infos have the same keys and types at every step;
+    Rules: STOP is always legal; an action that the mask forbids is invalid and leaves the shape alone; one that has no
+    room leaves it alone, too, but is not invalid; infos have the same keys and types at every step;
     restoring a state and playing on gives the same trace, bit for bit, and so does a copy of the state from a pickle.
     """
     rng = np.random.default_rng(seed)
@@ -354,8 +354,7 @@ def _checked_step(env: Any, action: int, before: dict[str, Any], where: str) -> 
     illegal = mask[action] == 0
     invalid = info["invalid_action"]
     is_same = info["r_all"] == before["r_all"]
-    has_no_room = is_same and info["action_mask"][action] == 0  # as is known now
-    _require(invalid == illegal or (invalid and has_no_room), f"{where}: invalid_action is wrong about action {action}")
+    _require(invalid == illegal, f"{where}: invalid_action is wrong about action {action}")
     _require(is_same or not illegal, f"{where}: an illegal action changed the shape")
     return tuple(outcome)
 

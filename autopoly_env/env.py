@@ -38,7 +38,7 @@ class EnvState:
     previous: PolyMesh | None  # the mesh one step earlier; None at the start
     best_r_all: float  # since the start
     action: str  # of the last step, in words
-    illegal: bool  # whether that was illegal, or had no room
+    illegal: bool  # whether that was illegal
     no_room: tuple[int, ...] = ()  # actions that the mesh as it is has proved to have no room for
 
 
@@ -70,8 +70,8 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
 
     `Discrete`: 0 is STOP, then each operator has one index for every element that a mesh of N vertices may have.
     `info["action_mask"]` (int8) and `action_masks()` (bool) say which are legal; an operator that would leave the
-    padding is not. An illegal action is a step in which nothing is done (`info["invalid_action"]`). So is, rarely, a
-    legal one that has no room, which is known once it is tried; the mask forbids it from then on.
+    padding is not. An illegal action is a step in which nothing is done (`info["invalid_action"]`). Nothing is done,
+    either, where a legal one, rarely, has no room, which is known once it is tried; the mask forbids it from then on.
 
     ## Reward
 
@@ -198,9 +198,10 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
         if before.done:
             raise EpisodeError(f"a step after the end of the episode ({before.done}): call reset() first")
         chosen = self.codec.decode(index)
-        after = (yield from self._transition(before, chosen)) if self._legal_mask()[index] else None
-        no_room = (index,) if after is None and self._legal_mask()[index] else ()
-        self._advance(after or self._simulator.idle(before), describe(before.mesh, chosen), after is None, no_room)
+        illegal = not self._legal_mask()[index]
+        after = None if illegal else (yield from self._transition(before, chosen))
+        no_room = (index,) if after is None and not illegal else ()
+        self._advance(after or self._simulator.idle(before), describe(before.mesh, chosen), illegal, no_room)
         done = self.state.done
         return self._observation(), self._reward(before), done in ("stop", "matched"), done == "max_steps", self._info()
 
@@ -297,7 +298,7 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
 
     def _advance(self, state: State, action: str, illegal: bool, no_room: tuple[int, ...]) -> None:
         now = self._current()
-        best, known = max(now.best_r_all, state.score.total), (*now.no_room, *no_room) if illegal else ()
+        best, known = max(now.best_r_all, state.score.total), (*now.no_room, *no_room) if illegal or no_room else ()
         self._episode = EnvState(self._rules, now.silhouette, state, now.state.mesh, best, action, illegal, known)
         self._mask = None
 

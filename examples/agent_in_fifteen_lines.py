@@ -10,8 +10,7 @@ def solve(seed: int, n_plays: int = 20) -> tuple[float, list[int]]:
     for _ in range(n_plays):
         info, actions, gain = env.reset(seed=seed)[1], [], 0.0
         for action in [*best[1], None, None, None]:
-            new = int(env.action_space.sample(info["action_mask"])) if action is None else action  # 0 is STOP
-            actions.append(new)
+            actions.append(int(env.action_space.sample(info["action_mask"])) if action is None else action)  # 0: STOP
             _, reward, terminated, truncated, info = env.step(actions[-1])
             gain += float(reward)
             best = max(best, (gain, actions.copy()))

@@ -20,7 +20,7 @@ from autopoly_env.operators import Action
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.simulator import Simulator
 from tests.helpers.drawings import BOTTLE, FRAME, HOUSE, L_SHAPE, painted
-from tests.helpers.guidance import LEFT, PLAYERS, START, WHOLE, assert_symmetric, solve
+from tests.helpers.guidance import LEFT, PLAYERS, RULES, START, WHOLE, assert_symmetric, solve
 from tests.helpers.paths import DOCS
 
 # --- a mesh or a sequence to go on from
@@ -93,11 +93,12 @@ def test_players__heed_all_guidance_at_once(name: str) -> None:
 
 @pytest.mark.parametrize("name", WHOLE)
 def test_agents_that_find_wholes__take_importance_and_nothing_else(name: str) -> None:
-    game = Simulator(painted(L_SHAPE), resolution=32, importance=np.where(LEFT, 1.0, 0.3))
+    rules = RULES.get(name, {})
+    game = Simulator(painted(L_SHAPE), resolution=32, importance=np.where(LEFT, 1.0, 0.3), **rules)
     assert solve(name, game, refits=10).sequence.settings["importance"]
     for guidance in ({"start": START}, {"start": START, "locked": (0,)}, {"symmetry": True}):
         with pytest.raises(ConfigError, match=f"{name} .* cannot heed '(start|symmetry)'.* greedy"):
-            solve(name, Simulator(painted(L_SHAPE), resolution=32, **guidance))
+            solve(name, Simulator(painted(L_SHAPE), resolution=32, **guidance, **rules))
 
 
 def test_every_agent__says_whether_it_takes_guidance() -> None:

@@ -37,8 +37,11 @@ def played(game: Simulator, seed: int, n_steps: int) -> list[State]:
         names = sorted({action.operator for action in legal})
         name = names[rng.integers(len(names))]
         of_it = [action for action in legal if action.operator == name]
-        states.append(game.transition(states[-1], of_it[rng.integers(len(of_it))]))
-    return states
+        try:
+            states.append(game.transition(states[-1], of_it[rng.integers(len(of_it))]))
+        except IllegalActionError:  # it has no room
+            states.append(game.idle(states[-1]))
+    return [state for state in states if state.action is not None or state is states[0]]
 
 
 def recorded(game: Simulator, states: list[State]) -> ConstructionSequence:

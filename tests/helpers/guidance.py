@@ -15,6 +15,7 @@ from autopoly_env.operators import Action, legal_actions
 from autopoly_env.simulator import Simulator, State
 
 PLAYERS = ("greedy", "beam", "random", "mcts")
+RULES: dict[str, dict[str, Any]] = {"quads": {"operators": "modeller", "faces": "quads"}}  # that an agent needs
 WHOLE = ("trace", "climb", "decimate", "quads", "dr-simple", "dr-complex")
 OPTIONS: dict[str, dict[str, Any]] = {
     "beam": {"width": 2, "patience": 2},
