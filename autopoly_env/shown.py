@@ -31,7 +31,7 @@ def told(text: str, most: int = MOST_LETTERS) -> str:
     if len(line) <= most:
         return line
     n = round(_KEPT * (most - 5))
-    return f"{line[:n]} ... {line[len(line) - (most - 5 - n) :]}"
+    return f"{line[:n].rstrip()} ... {line[len(line) - (most - 5 - n) :].lstrip()}"
 
 
 def short(value: Any, most: int = _SHORT) -> str:

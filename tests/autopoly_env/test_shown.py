@@ -1,7 +1,7 @@
 """Text from outside as it is shown: one line, tame, not too long; and the errors, which all are."""
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from autopoly_env import errors
@@ -11,6 +11,7 @@ ERRORS = [kind for kind in vars(errors).values() if isinstance(kind, type) and i
 
 
 @given(st.text(st.characters(codec=None, exclude_categories=())), st.integers(10, 90))
+@example("\x1b\r\U0001342f", 13)  # cut at a space
 def test_told__is_one_printable_line_of_so_many_letters(text: str, most: int) -> None:
     line = told(text, most)
     assert line.isprintable()

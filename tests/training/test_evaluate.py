@@ -459,7 +459,7 @@ def test_broken_record__is_named_by_its_line(run: Run) -> None:
     ("arguments", "message"),
     [
         ([], "Missing argument"),
-        (["nobody"], "suite 'nobody' is unknown; give one of folder, objects, paper, shapenet"),
+        (["nobody"], "suite 'nobody' is unknown; give one of folder, modeller, objects, paper, shapenet"),
         (["none.yaml"], "cannot read none.yaml (No such file or directory)"),
         (["tiny.yaml", "--agents", "nobody"], "agent 'nobody' is unknown; give some of trace, random"),
         (["tiny.yaml", "--engine", "dask"], "engine 'dask' is unknown; give one of serial, process, ray"),
