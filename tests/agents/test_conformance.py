@@ -39,6 +39,7 @@ def options(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "operators"),
     [
@@ -61,6 +62,7 @@ def test_agent__conforms(name: str, operators: str) -> None:
     assert once["island"].sequence.to_json() == anew.sequence.to_json() != once["house"].sequence.to_json()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WITH_NETWORKS)
 def test_agent_with_networks__conforms(name: str, options: dict[str, dict[str, Any]]) -> None:
     agent, anew = (quick(name, **options[name]) for _ in range(2))
@@ -211,6 +213,7 @@ def test_plain__conforms() -> None:
     check_agent(Plain(), **SMALL)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("agent", "rule"),
     [

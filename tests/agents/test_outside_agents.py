@@ -99,6 +99,7 @@ def boxes(*names: str) -> list[Path]:
 # --- the one in the documentation
 
 
+@pytest.mark.slow
 def test_documented_agent__solves_from_the_command_line(tmp_path: Path) -> None:
     Path("hasty.py").write_text(HASTY)
     assert len([line for line in HASTY.splitlines() if line.strip()]) <= 25
@@ -117,6 +118,7 @@ def test_documented_check__passes() -> None:
     exec(CHECK, {})
 
 
+@pytest.mark.slow
 def test_documented_agent__is_found_by_spawned_workers(measure: Run) -> None:
     Path("hasty.py").write_text(HASTY)
     boxes("images.png")
@@ -324,6 +326,7 @@ def test_broken_contract__is_one_line_with_its_module_and_the_others_go_on(run: 
     assert done.err.startswith(f"error: {CHAIR}: ") and message.format(name=name) in done.err and name in done.err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["serial", "process"])
 def test_broken_contract__is_in_the_record_and_the_other_tasks_go_on(measure: Run, engine: str) -> None:
     name = module("raise ValueError('no idea')")

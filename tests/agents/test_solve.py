@@ -205,6 +205,7 @@ def test_quiet__leaves_the_table_and_the_warnings(run: Run) -> None:
     assert "warning: photo.png: the light is uneven" in done.out
 
 
+@pytest.mark.slow
 def test_json__prints_nothing_else_on_stdout(run: Run) -> None:
     small_image("pictures/b.png")
     small_image("pictures/a.png")
@@ -300,6 +301,7 @@ def test_wrong_usage__is_one_line_and_exit_code_2(run: Run, arguments: list[str]
     assert not Path("out").exists()
 
 
+@pytest.mark.slow
 def test_bad_images__are_reported_one_by_one_and_stop_nothing(run: Run) -> None:
     small_image("good.png")
     Path("cut.png").write_bytes((EXAMPLES / "chair.png").read_bytes()[:700])
@@ -511,6 +513,7 @@ def test_simulations__limit_a_tree_search_and_are_refused_by_others(run: Run) ->
 # Styles
 
 
+@pytest.mark.slow
 def test_style__brings_agent_operators_and_rule_unless_they_are_given(run: Run) -> None:
     image = EXAMPLES / "key.png"
     quick = ("--refits", 60, "--json", "--quiet")

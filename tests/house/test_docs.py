@@ -85,6 +85,7 @@ def is_there(name: str) -> bool:
     return False
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("package", ["pages", "autopoly_env", "agents", "training", "benchmarks", "docs", "examples"])
 def test_files_and_modules_that_are_named__are_there(package: str) -> None:
     for path in PAGES.values() if package == "pages" else sorted((ROOT / package).rglob("*.py")):

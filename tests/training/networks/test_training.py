@@ -314,6 +314,7 @@ def test_run__leaves_log_pictures_report_and_weights(finished: Path) -> None:
     assert load_nfap(finished / "nfap.safetensors")[1].metrics["loss"] == report["metrics"]["loss"]
 
 
+@pytest.mark.slow
 def test_run__that_was_killed_goes_on_along_the_same_curve(
     shards: Path, finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
