@@ -209,6 +209,7 @@ def mistold(solution: Solution) -> Solution:
 SMALL: dict[str, Any] = {"resolution": 16, "max_steps": 4}
 
 
+@pytest.mark.slow
 def test_plain__conforms() -> None:
     check_agent(Plain(), **SMALL)
 

@@ -151,6 +151,7 @@ def test_glb__is_chosen_by_the_name_of_the_file(run: Run) -> None:
     assert Path("house.glb").read_bytes()[:4] == b"glTF"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", [suffix for made in FORMATS.values() for suffix in made.suffixes])
 def test_ending_of_the_file__decides_where_no_format_is_named(run: Run, ending: str) -> None:
     (made,) = (made for made in FORMATS.values() if ending in made.suffixes)
@@ -377,6 +378,7 @@ def test_register_format__refuses_what_is_taken(monkeypatch: pytest.MonkeyPatch)
         Format("plain", ("obj",), "", print)
 
 
+@pytest.mark.slow
 def test_one_writer__does_not_load_the_others() -> None:
     code = (
         "import sys\nfrom autopoly_env.export.formats import find_format\nfind_format('gltf')\n"

@@ -44,6 +44,7 @@ def test_override__means_by_json_what_json_says(text: str) -> None:
     assert (value, type(value)) == (json.loads(text), type(json.loads(text)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
@@ -68,6 +69,7 @@ def test_examples__are_true() -> None:
 BOMB = "\n".join(["a0: &a0 [x, x, x]", *(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 30))])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "problem"),
     [

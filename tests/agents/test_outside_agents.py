@@ -113,6 +113,7 @@ def test_documented_agent__solves_from_the_command_line(tmp_path: Path) -> None:
     assert ConstructionSequence.load(record["files"]["sequence.json"]).settings["agent"] == "hasty:Hasty"
 
 
+@pytest.mark.slow
 def test_documented_check__passes() -> None:
     Path("hasty.py").write_text(HASTY)
     exec(CHECK, {})
@@ -236,6 +237,7 @@ def test_seed_of_a_file__is_its_default_only(run: Run, arguments: tuple[object, 
     assert settings["seed"] == settings["options"].get("seed", seed) == seed
 
 
+@pytest.mark.slow
 def test_file_in_the_repository__is_the_default(run: Run) -> None:
     done = run(CHAIR, "--agent", ROOT / "configs" / "agent" / "trace.yaml", *QUICK, "--json")
     assert json.loads(done.out)["agent"] == "trace"

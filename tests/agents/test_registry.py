@@ -9,6 +9,7 @@ from autopoly_env.errors import ConfigError
 from tests.helpers.solving import simulator
 
 
+@pytest.mark.slow
 def test_registry__names_agents_after_themselves() -> None:
     assert {"random", "greedy", "beam", "trace", "climb"} <= {*AGENTS}
     for name in AGENTS:

@@ -266,6 +266,7 @@ def test_check__raises_what_it_promises_whatever_it_is_given(check: Callable[[],
 # --- formats
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name, _, _ in LISTED])
 def test_every_format__conforms(name: str) -> None:
     check_format(find_format(name))

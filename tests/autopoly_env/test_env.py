@@ -22,6 +22,7 @@ from tests.helpers.paths import ROOT
 # --- Gymnasium
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", IDS)
 def test_gymnasiums_check__passes_without_a_warning(name: str) -> None:
     env = gymnasium.make(f"autopoly_env:{name}", **IDS[name]).unwrapped

@@ -113,6 +113,7 @@ def test_iou__of_a_polygon_equals_that_of_its_exact_areas(seed: int) -> None:
     assert intersection_over_union(polygon(points), target) == expected
 
 
+@pytest.mark.slow
 @given(meshes(), st.integers(0, 99), st.sampled_from((5, 16, 64, 100)))
 def test_iou__equals_that_of_the_whole_image(mesh: PolyMesh, seed: int, resolution: int) -> None:
     target = noise(seed).target(resolution)
@@ -164,6 +165,7 @@ def test_self_intersections__equal_shapelys_where_all_is_degenerate(
 # --- small pictures: exact areas ---
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**32 - 1), st.integers(1, 63))
 def test_iou__of_a_small_picture_is_that_of_the_shapes(seed: int, resolution: int) -> None:
     rng = np.random.default_rng(seed)

@@ -13,6 +13,7 @@ from benchmarks.fuzz.tally import Tally, fuzz, table, try_one
 INPUTS = {"sequence": 120, "array": 60, "option": 120, "simulator": 60, "environment": 30, "yaml": 20, "command": 3}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DOORS)
 def test_odd_inputs__are_accepted_or_refused_in_one_tame_line(name: str) -> None:
     tally = Tally()

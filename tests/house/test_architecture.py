@@ -88,6 +88,7 @@ def lies_in(path: Path, places: tuple[str, ...]) -> bool:
     return any(here == place or here.startswith(f"{place}/") for place in places)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("module", "forbidden", "allowed"), LINES, ids=[line[0] for line in LINES])
 def test_module__is_imported_only_where_it_may_be(
     module: str, forbidden: tuple[str, ...], allowed: tuple[str, ...]

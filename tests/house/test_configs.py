@@ -56,6 +56,7 @@ def test_make_agent__of_a_file_is_the_agent_with_these_options(tmp_path: Path) -
     assert agent.solve(game).sequence == make_agent("beam", width=2, patience=1).solve(game).sequence
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [

@@ -127,6 +127,7 @@ def test_gradient__crosses_itself_only_where_it_may(torch: Any) -> None:
     assert defects[False] == 0 < defects[True]
 
 
+@pytest.mark.slow
 def test_gradient__looks_where_matching_matters(torch: Any) -> None:
     importance = np.ones((64, 64))
     importance[:, :32] = 0.0

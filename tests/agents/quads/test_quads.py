@@ -38,6 +38,7 @@ def test_two_squares__are_two_quads() -> None:
     assert solution.mesh.topology.n_components == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("target", ["house", "L", "island", "blobs"])
 def test_every_mesh__keeps_the_rule(target: str) -> None:
     solution = make_agent("quads").solve(game(target), Budget(150))
@@ -52,6 +53,7 @@ def test_mcts__goes_on_from_it_under_the_rule() -> None:
     assert all(broken_faces(mesh, "quads") == [] for mesh in both.sequence.meshes())
 
 
+@pytest.mark.slow
 def test_seed__decides_and_nothing_else() -> None:
     first, again, other = (make_agent("quads", seed=seed).solve(game("blobs"), Budget(200)) for seed in (0, 0, 7))
     assert first.sequence.to_json() == again.sequence.to_json()

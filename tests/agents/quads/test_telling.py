@@ -86,6 +86,7 @@ def test_part_of_its_own__is_grown_and_cut_off(second: np.ndarray) -> None:
     assert taken[3:] == ([] if len(second) == 4 else ["vertex_dissolve"])
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(st.integers(0, 2**32 - 1))
 def test_any_cut__is_built_face_by_face(seed: int) -> None:

@@ -117,6 +117,7 @@ def test_logits__are_never_for_what_is_not_legal() -> None:
         assert np.array_equal(row > 0.5 * NEVER, CODEC.legal_mask(one))
 
 
+@pytest.mark.slow
 def test_policy__looks_at_target_price_and_steps() -> None:
     net, seen = network(), batch_of([mesh()])
     with torch.no_grad():

@@ -36,6 +36,7 @@ def test_trace__of_a_slanting_line_one_pixel_wide_is_a_ring(size: int) -> None:
     assert solution.score.iou >= 0.95 and solution.mesh.topology.n_holes == 1
 
 
+@pytest.mark.slow
 def test_trace__gives_a_contour_as_many_corners_as_it_is_worth() -> None:
     game = Simulator(comb(24), weights=ScoreWeights(w_sc=0.02), max_steps=1000)
     solution = make_agent("trace").solve(game)

@@ -69,6 +69,7 @@ def test_ties__are_the_linear_reduction_of_gradient_and_normal_matrix() -> None:
     assert not tied.ravel()[others].any() and (np.tril(normal)[others] == np.eye(10)[others]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("operators", "n_steps"), [("full", 20), ("modeller", 10)])
 @given(st.integers(0, 2**32 - 1), st.sampled_from([True, 0.37]))
 @settings(max_examples=6)

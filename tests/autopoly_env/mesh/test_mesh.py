@@ -262,6 +262,7 @@ def test_canonical_hash__tells_a_split_quad_by_its_diagonal() -> None:
     assert len(hashes) == 3
 
 
+@pytest.mark.slow
 @given(meshes(40))
 def test_boundary__is_every_half_edge_without_a_twin_in_closed_loops(mesh: PolyMesh) -> None:
     directed = {pair for face in mesh.faces for pair in pairwise((*face, face[0]))}

@@ -438,6 +438,7 @@ def check_topology(mesh: PolyMesh) -> None:
     assert len(sides) == n_edges
 
 
+@pytest.mark.slow
 @settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 @given(walks())
 def test_walk__keeps_meshes_valid_euler_true_effects_exact_and_ids_fresh(walk: list[Transition]) -> None:

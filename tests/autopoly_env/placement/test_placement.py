@@ -214,6 +214,7 @@ def test_starts__are_no_worse_than_the_mesh_or_else_the_operators_own(mesh: Poly
         assert found[-1].mesh == made
 
 
+@pytest.mark.slow
 @given(meshes(), st.integers(0, 99))
 def test_what_does_not_show__leaves_the_picture_as_it_is(mesh: PolyMesh, seed: int) -> None:
     disagreement = Disagreement(mesh, noise(seed))

@@ -101,6 +101,7 @@ def test_coverage__refuses_a_senseless_resolution(resolution: int) -> None:
 # --- coverage, against the areas of intersections ---
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("resolution", [1, 2, 3, 7, 33, 63, 64, 65, 127, 128, 129, 200])
 def test_coverage__of_concave_polygons_equals_shapely(resolution: int) -> None:
     for seed in range(3 if resolution > 100 else 8):
@@ -139,6 +140,7 @@ TINY = st.sampled_from([0.0] * 6 + [1e-15, -1e-12, 1e-9, -1e-6, 1e-300])
 LATTICE = st.builds(lambda half, tiny: half / 2 + tiny, st.integers(-2, 10), TINY)  # in pixels
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(LATTICE, LATTICE), min_size=3, max_size=6), st.sampled_from([1, 3, 4]))
 @settings(max_examples=150)
 def test_coverage__of_any_loop_on_pixel_borders_equals_exact_fractions(

@@ -206,6 +206,7 @@ def awkward_meshes(draw: st.DrawFn) -> PolyMesh:
     return mesh.with_vertices(points)
 
 
+@pytest.mark.slow
 @given(awkward_meshes(), silhouettes(), st.sampled_from([1, 3, 8, 16, 64, 65, 100]), st.sampled_from([*CONFIGS]))
 @settings(max_examples=250)
 def test_refit__keeps_its_promises(mesh: PolyMesh, silhouette: Silhouette, resolution: int, config: str) -> None:

@@ -126,6 +126,7 @@ def test_gesture__without_a_selection_only_takes_getting_ready(monkeypatch: pyte
     assert effort(subdivided(({}, 0.6))) == pytest.approx(1.35 + 2 * 0.28)
 
 
+@pytest.mark.slow
 @given(walks(1, 25))
 def test_effort__is_the_sum_over_the_steps_and_at_least_a_selection_and_a_key_each(walk: list[Transition]) -> None:
     taken = [(one.action, one.choice, one.after, SCORE) for one in walk]

@@ -140,6 +140,7 @@ def test_labels__are_one_for_each_step() -> None:
         table().with_parts([None] * 3)
 
 
+@pytest.mark.slow
 @given(walks(1, 25))
 def test_parts__of_any_construction_are_numbered_as_they_begin_and_are_what_their_names_say(
     walk: list[Transition],

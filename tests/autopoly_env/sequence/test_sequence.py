@@ -128,6 +128,7 @@ def test_to_json__refuses_a_vertex_that_is_not_finite() -> None:
         ConstructionSequence({}, lost, score()).to_json()
 
 
+@pytest.mark.slow
 @settings(max_examples=25, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 @given(walks())
 def test_replay__from_json_gives_every_mesh_bit_for_bit(walk: list[Transition]) -> None:

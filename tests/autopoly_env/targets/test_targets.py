@@ -295,6 +295,7 @@ LEAST_HOLES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", LEAST_HOLES)
 def test_family__has_the_holes_that_make_it(things: dict[str, list[np.ndarray]], family: str) -> None:
     assert min(parts_and_holes(mask)[1] for mask in things[family]) >= LEAST_HOLES[family]

@@ -26,6 +26,7 @@ def written(folder: Path, text: str) -> str:
     return str(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SUITES)
 def test_shipped_suite__can_be_read_and_names_agents_that_there_are(name: str) -> None:
     suite = find_suite(name)
