@@ -85,10 +85,6 @@ class Meter:
         """A meter for a share, 0 to 1, of what is left."""
         return Meter(self.rest().share(share), whole=self)
 
-    def limited(self, budget: Budget) -> "Meter":
-        """A meter for as much of what is left."""
-        return Meter(budget, whole=self)
-
     def add(self, states: Sequence[State], n_refits: int = 0) -> None:
         """Note the states that one step of work produced.
 

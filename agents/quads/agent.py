@@ -4,13 +4,13 @@ Outlines are searched at the price that their vertices have once they are cut in
 refitted under the rule of faces, and told in the order of modelling (`telling`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from agents.base import WholeAgent
-from agents.budget import Budget, Meter
+from agents.budget import Budget, Meter, Progress
 from agents.finish import finish
 from agents.quads.building import OPERATORS, build
 from agents.quads.hill import QuadHill, QuadPlace, total_of
@@ -59,9 +59,18 @@ class QuadsAgent(WholeAgent):
         if simulator.faces == "any":
             raise ConfigError("quads builds convex faces: give faces=quads or convex")
 
+    def solve(
+        self,
+        simulator: Simulator,
+        budget: Budget | None = None,
+        on_progress: Callable[[Progress], None] | None = None,
+    ) -> Solution:
+        """As every agent. A budget without limits is one of `config.n_refits`."""
+        if budget is None or budget == Budget():
+            budget = Budget(self._config.n_refits)
+        return super().solve(simulator, budget, on_progress)
+
     def _find(self, simulator: Simulator, meter: Meter) -> Solution:
-        if meter.rest() == Budget():
-            meter = meter.limited(Budget(self._config.n_refits))
         hill = QuadHill(simulator)
         places: list[QuadPlace] = []
         try:

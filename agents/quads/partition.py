@@ -13,6 +13,7 @@ from agents.quads import partition_kernels
 from agents.trace.outline import Outline
 from autopoly_env.arrays import FloatArray
 from autopoly_env.mesh import Face, PolyMesh, Topology, is_sane
+from autopoly_env.mesh.corner_kernels import turns
 
 LEAST_SINE = 0.02  # of the turn at every corner of a face
 MOST_CORNERS = 160  # of one part and its holes that are cut exactly; the time grows with the fourth power
@@ -68,7 +69,7 @@ def bent(mesh: PolyMesh) -> PolyMesh | None:
     """The mesh with vertices moved so that all faces are convex; None where that takes too much."""
     topology, points = mesh.topology, mesh.vertices.copy()
     partition_kernels.bend(points, topology.corners, topology.face_offsets, BENT_SINE, _N_ROUNDS)
-    if partition_kernels.least_turn(points, topology.corners, topology.face_offsets) < LEAST_SINE:
+    if turns(points, topology.corners, topology.face_offsets).min() < LEAST_SINE:
         return None
     moved = mesh.with_vertices(np.clip(points, 0.0, 1.0))
     return moved if is_sane(moved) else None

@@ -8,6 +8,7 @@ import numpy as np
 
 from autopoly_env.arrays import BoolArray, FloatArray, IntArray
 from autopoly_env.compute import kernel
+from autopoly_env.mesh.corner_kernels import turn
 from autopoly_env.mesh.planar_kernels import enters_cone, segments_touch
 
 UGLINESS = 0.1  # what the worst corner of a face costs at most, in elements
@@ -16,44 +17,19 @@ BENDING = 2.0  # what it costs for each unit of sine that a corner has to be ben
 
 @kernel
 def visible(points: FloatArray, names: IntArray) -> BoolArray:
-    """(n, n) whether a diagonal joins two corners inside the polygon, touching nothing else of it."""
-    n = len(points)
+    """(n, n) whether a diagonal joins two corners of the polygon `names` (n,) inside it and touches nothing of it."""
+    n, ring = len(names), points[names]
     seen = np.zeros((n, n), np.bool_)
     for i in range(n):
         for j in range(i + 2, n):
             if i == 0 and j == n - 1:
                 continue
-            if names[i] == names[j] or not enters_cone(points, i, points[j, 0], points[j, 1], False):
+            if names[i] == names[j] or not enters_cone(ring, i, ring[j, 0], ring[j, 1], False):
                 continue
-            if not enters_cone(points, j, points[i, 0], points[i, 1], False):
+            if not enters_cone(ring, j, ring[i, 0], ring[i, 1], False):
                 continue
-            seen[i, j] = seen[j, i] = _is_free(points, names, i, j)
+            seen[i, j] = seen[j, i] = _misses(points, names, names[i], names[j])
     return seen
-
-
-@kernel
-def _is_free(points: FloatArray, names: IntArray, i: int, j: int) -> bool:
-    """Whether the segment between two corners touches no edge but those that begin or end there."""
-    n = len(points)
-    for k in range(n):
-        m = k + 1 if k + 1 < n else 0
-        if names[k] == names[i] or names[k] == names[j] or names[m] == names[i] or names[m] == names[j]:
-            continue
-        if segments_touch(
-            points[i, 0], points[i, 1], points[j, 0], points[j, 1], points[k, 0], points[k, 1], points[m, 0],
-            points[m, 1],
-        ):  # fmt: skip
-            return False
-    return True
-
-
-@kernel
-def corner_sine(points: FloatArray, a: int, b: int, c: int) -> float:
-    """Sine of the turn at b on the way a, b, c: positive where the corner is convex."""
-    ux, uy = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
-    vx, vy = points[c, 0] - points[b, 0], points[c, 1] - points[b, 1]
-    length = np.sqrt((ux * ux + uy * uy) * (vx * vx + vy * vy))
-    return (ux * vy - uy * vx) / length if length > 0.0 else 0.0
 
 
 @kernel
@@ -85,15 +61,13 @@ def least_costs(
                         total = cost[i, k] + cost[k, j] + 2.0 + UGLINESS * (1.0 - worst)
                         if total < cost[i, j]:
                             cost[i, j], faces[i, j, 0], faces[i, j, 1] = total, k, -1
-                at_k = corner_sine(points, j, i, k)
+                at_k = turn(points, j, i, k)
                 if at_k < least_sine - bend:
                     continue
                 for m in range(k + 1, j):
                     if not cost[i, k] + cost[k, m] + cost[m, j] + 2.0 < cost[i, j]:
                         continue
-                    worst = min(
-                        at_k, corner_sine(points, i, k, m), corner_sine(points, k, m, j), corner_sine(points, m, j, i)
-                    )
+                    worst = min(at_k, turn(points, i, k, m), turn(points, k, m, j), turn(points, m, j, i))
                     if worst >= least_sine - bend and names[i] != names[m] and names[k] != names[j]:
                         total = cost[i, k] + cost[k, m] + cost[m, j] + 2.0 + UGLINESS * (1.0 - worst)
                         total += BENDING * max(0.0, least_sine - worst)
@@ -104,7 +78,7 @@ def least_costs(
 
 @kernel
 def _worst_of_triangle(points: FloatArray, a: int, b: int, c: int) -> float:
-    return min(corner_sine(points, c, a, b), corner_sine(points, a, b, c), corner_sine(points, b, c, a))
+    return min(turn(points, c, a, b), turn(points, a, b, c), turn(points, b, c, a))
 
 
 @kernel
@@ -115,7 +89,7 @@ def cut(points: FloatArray, names: IntArray, least_sine: float, bend: float) -> 
     """
     n = len(names)
     corners = points[names]
-    costs, chosen = least_costs(corners, names, visible(corners, names), least_sine, bend)
+    costs, chosen = least_costs(corners, names, visible(points, names), least_sine, bend)
     if n < 3 or costs[0, n - 1] == np.inf:
         return np.inf, np.empty((0, 4), np.int64)
     faces = np.empty((n - 2, 4), np.int64)
@@ -154,9 +128,9 @@ def bridged(points: FloatArray, around: IntArray, holes: IntArray, offsets: IntA
     n = len(around)
     polygon[:n] = around
     is_joined = np.zeros(n_holes, np.bool_)
-    for turn in range(n_holes):
+    for nth in range(n_holes):
         longer, best_i, best_h, best_j = -1.0, -1, -1, -1
-        for _ in range(rank + 1 if turn == 0 else 1):
+        for _ in range(rank + 1 if nth == 0 else 1):
             shortest = np.inf
             best_i = -1
             for h in range(n_holes):
@@ -224,18 +198,6 @@ def _misses(points: FloatArray, ring: IntArray, a: int, b: int) -> bool:
         ):  # fmt: skip
             return False
     return True
-
-
-@kernel
-def least_turn(points: FloatArray, corners: IntArray, offsets: IntArray) -> float:
-    """The least sine of a turn at any corner of the faces, as a topology lists them."""
-    least = 1.0
-    for f in range(len(offsets) - 1):
-        start, n = offsets[f], offsets[f + 1] - offsets[f]
-        for k in range(n):
-            a, b, c = corners[start + k], corners[start + (k + 1) % n], corners[start + (k + 2) % n]
-            least = min(least, corner_sine(points, a, b, c))
-    return least
 
 
 @kernel

@@ -11,7 +11,7 @@ from autopoly_env.mesh.planar_kernels import clear_extrusion
 from autopoly_env.operators.action import Choice, Start
 from autopoly_env.operators.edge_extrude import INSET, MAX_HALVINGS, boundary_edges
 from autopoly_env.operators.elements import EDGE
-from autopoly_env.operators.evidence import Evidence, sane_move
+from autopoly_env.operators.evidence import Evidence, missing_mass, sane_move
 from autopoly_env.operators.mirroring import again, moved
 from autopoly_env.operators.operator import Mirroring, Operator
 from autopoly_env.operators.rebuilding import ends_along_face, grown, refusal
@@ -44,11 +44,6 @@ def _begin(evidence: Evidence, edge: int) -> Iterator[Start]:
     yield Start(None, plain)
 
 
-def _promise(evidence: Evidence, edge: int) -> float:
-    missing = evidence.missing(edge)
-    return 0.0 if missing is None else missing.mass
-
-
 def _mirror(of: Mirroring, start: Start) -> Iterator[Start]:
     """Two triangles; one, and its tip on the axis, where the edge crosses it."""
     new, first = len(of.mesh.vertices), start.mesh
@@ -78,7 +73,7 @@ edge_cap = Operator(
     boundary_edges,
     cap,
     begin=_begin,
-    promise=_promise,
+    promise=missing_mass,
     mirror=_mirror,
     sources=_sources,
     phrases=Phrases(

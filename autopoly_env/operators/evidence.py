@@ -68,3 +68,9 @@ def sane_move(evidence: Evidence, plain: PolyMesh, goal: FloatArray | Sequence[S
         if crossings <= evidence.defects[0] and flipped <= evidence.defects[1]:
             yield moved
             return
+
+
+def missing_mass(evidence: Evidence, edge: int) -> float:
+    """The area (unit square) that is missing outside a boundary edge, as far as it answers for it."""
+    missing = evidence.missing(edge)
+    return 0.0 if missing is None else missing.mass

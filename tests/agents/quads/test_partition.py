@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 from agents.quads.hill import complexity_of
 from agents.quads.partition import LEAST_SINE, MOST_BENT, bent, least_faces, mesh_of, partitioned
-from agents.quads.partition_kernels import corner_sine
 from agents.trace.outline import Outline
 from agents.trace.rings import Ring
 from autopoly_env.arrays import FloatArray
 from autopoly_env.mesh import PolyMesh, broken_faces, is_sane
+from autopoly_env.mesh.corner_kernels import turn
 from tests.helpers.rings import BOX, TRIANGLE, hole, random_rings, regular, small
 from tests.helpers.shapes import star
 
@@ -54,7 +54,7 @@ def fewest_faces(points: FloatArray) -> float:
 
     def is_face(corners: tuple[int, ...]) -> bool:
         n = len(corners)
-        turns = [corner_sine(points, corners[k], corners[(k + 1) % n], corners[(k + 2) % n]) for k in range(n)]
+        turns = [turn(points, corners[k], corners[(k + 1) % n], corners[(k + 2) % n]) for k in range(n)]
         return min(turns) >= LEAST_SINE and polygon.buffer(1e-9).covers(shapely.Polygon(points[list(corners)]))
 
     @cache
