@@ -119,6 +119,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_commands__take_the_rule_and_carry_it_on(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     quick_ones = ("--resolution", "32", "--refits", "60", "--quiet")
     assert main(["ell.png", "--agent", "greedy", "--operators", BUILDERS, "--faces", "quads", *quick_ones]) == 0

@@ -217,6 +217,7 @@ def test_names__are_those_of_the_registry() -> None:
 # --- files of options
 
 
+@pytest.mark.slow
 def test_file__is_the_agent_with_its_options_and_is_recorded_as_that(run: Run) -> None:
     Path("beam.yaml").write_text("width: 2\npatience: 1\n")
     done = run(CHAIR, "--agent", "beam.yaml", "--option", "patience=2", *QUICK, "--json")

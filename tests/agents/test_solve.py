@@ -253,6 +253,7 @@ def test_option__reaches_the_agent_and_wins_over_the_seed(run: Run) -> None:
     assert settings["seed"] == 5
 
 
+@pytest.mark.slow
 def test_option__may_be_a_list_without_quotes_inside(run: Run) -> None:
     small_image("box.png")
     done = run("box.png", "--option", "seeds=[trace]", "--option", "hop_patience=0", "--json", *QUICK)

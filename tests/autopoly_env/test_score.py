@@ -54,6 +54,7 @@ def test_score__comes_back_from_json() -> None:
     assert Score(**json.loads(json.dumps(found.as_dict()))) == found
 
 
+@pytest.mark.slow
 @given(meshes(), st.sampled_from(("w_sm", "w_sc", "w_si")), st.floats(0.0, 1e3), st.floats(0.0, 1e3))
 def test_score__rises_with_w_sm_and_falls_with_the_other_weights(mesh: PolyMesh, name: str, a: float, b: float) -> None:
     target = painted(SQUARE, 16).target(16)
@@ -145,6 +146,7 @@ def test_self_intersections__are_the_pairs_of_edges_that_meet(mesh: PolyMesh, ex
     assert self_intersections(mesh) == expected
 
 
+@pytest.mark.slow
 @given(meshes())
 def test_self_intersections__equal_shapelys(mesh: PolyMesh) -> None:
     assert self_intersections(mesh) == pairs_that_meet(mesh.vertices, mesh.edges)

@@ -397,6 +397,7 @@ def test_final_score__is_at_the_silhouettes_own_resolution() -> None:
 # --- random play ---
 
 
+@pytest.mark.slow
 @given(st.integers(0, 99), st.integers(0, 2**32 - 1), st.sampled_from(("paper", "full")))
 @settings(max_examples=25)
 def test_random_play__never_does_worse_than_the_operators(target: int, seed: int, operators: str) -> None:

@@ -63,6 +63,7 @@ def test_figures__of_an_untrained_policy(tmp_path: Path, capsys: pytest.CaptureF
     assert "'twice': expected one of 'one pass'" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_throughput_and_curves__are_read_from_logs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     shares = {"train/share_env": 0.5, "train/share_inference": 0.2, "train/share_update": 0.3}
     lines = [  # the first evaluation is of an older version, which called it an exam

@@ -8,7 +8,7 @@
         assert page.problems() == []  # nothing on the console
         page.screenshot(tmp_path / "page.png")
 
-A module that needs it says so with `pytestmark = needs_browser`; the mark skips, and says why, where there is none.
+A test that needs it says so with `@needs_browser`: it is skipped, and says why, where there is none, and it is slow.
 The protocol: https://chromedevtools.github.io/devtools-protocol. Its messages are JSON texts with a zero byte after
 each, read from the browser's file descriptor 3 and written to its 4.
 """
@@ -67,9 +67,14 @@ def find_browser() -> str | None:
     return named or next(filter(None, map(shutil.which, NAMES)), None)
 
 
-needs_browser = pytest.mark.skipif(
+_skipped_without = pytest.mark.skipif(
     find_browser() is None, reason="Chromium is not installed (apt-get install chromium, or set CHROMIUM to its path)"
 )
+
+
+def needs_browser(test: Callable[..., None]) -> Callable[..., None]:
+    """Marks a test that drives Chromium."""
+    return pytest.mark.slow(_skipped_without(test))
 
 
 class BrowserError(Exception):

@@ -128,6 +128,7 @@ def test_series__come_as_the_suite_has_them_in_whatever_order_they_were_done(tmp
     assert [one.label for one in series] == ["a", "b", "new"]
 
 
+@pytest.mark.slow
 def test_gallery__takes_the_worst_of_each_agent_in_turn(tmp_path: Path) -> None:
     good = {f"t{k}": 90.0 for k in range(50)}
     first = records_of("first", good | {"t7": 10.0, "t8": 11.0})

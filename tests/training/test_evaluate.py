@@ -263,6 +263,7 @@ def test_dead_worker__is_a_failed_task(run: Run, monkeypatch: pytest.MonkeyPatch
 # Runs that are cut off
 
 
+@pytest.mark.slow
 def test_resume__does_what_has_no_record_and_drops_half_a_line(run: Run) -> None:
     run("tiny.yaml", "--out", "whole")
     run("tiny.yaml", "--out", "cut")

@@ -139,6 +139,7 @@ def test_gradient__looks_where_matching_matters(torch: Any) -> None:
     )
 
 
+@pytest.mark.slow
 def test_gradient__returns_the_best_so_far_on_ctrl_c(torch: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     game, agent = simulator("L"), make_agent("dr-complex", refit="gradient")
     n_calls = iter(range(100))

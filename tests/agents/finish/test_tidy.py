@@ -164,6 +164,7 @@ def test_tidy__keeps_a_detour_round_a_crossing() -> None:
     assert tidy(sequence, scored) == sequence
 
 
+@pytest.mark.slow
 @given(st.integers(0, 10_000), st.booleans())
 @settings(max_examples=25)
 def test_tidy__never_ends_otherwise_and_never_takes_longer(seed: int, in_the_game: bool) -> None:

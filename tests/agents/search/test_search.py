@@ -169,6 +169,7 @@ def test_search__stops_at_the_budget_and_where_nothing_can_be_done() -> None:
     assert played(Game({"r": 1.0}, {})) == ""
 
 
+@pytest.mark.slow
 def test_prior__residual_begins_with_the_edge_to_blame() -> None:
     game = simulator("house", resolution=64)
     state = game.initial()

@@ -68,6 +68,7 @@ def test_solid_with_a_pinch__has_a_vertex_for_either_side(mesh: PolyMesh) -> Non
     assert is_closed(solid.faces) and volume(solid) == pytest.approx(0.2 * mesh.face_areas().sum())
 
 
+@pytest.mark.slow
 @given(meshes(), st.floats(0.01, 2.0))
 def test_solid__is_closed_and_has_the_volume_area_times_depth(mesh: PolyMesh, depth: float) -> None:
     solid = to_solid(mesh, depth)
@@ -75,6 +76,7 @@ def test_solid__is_closed_and_has_the_volume_area_times_depth(mesh: PolyMesh, de
     assert volume(solid) == pytest.approx(depth * mesh.face_areas().sum(), abs=1e-9)
 
 
+@pytest.mark.slow
 @given(meshes(), st.sampled_from((0.0, 0.25)))
 def test_triangles_of_a_solid__keep_its_edges(mesh: PolyMesh, depth: float) -> None:
     solid = to_solid(mesh, depth)

@@ -242,6 +242,7 @@ def renumbered(mesh: PolyMesh, rng: random.Random) -> PolyMesh:
     return PolyMesh.from_faces(mesh.vertices[order], [[order.index(v) for v in face] for face in faces])
 
 
+@pytest.mark.slow
 @given(meshes(), st.randoms(use_true_random=False))
 def test_canonical_hash__does_not_see_the_numbering(mesh: PolyMesh, rng: random.Random) -> None:
     assert canonical_hash(renumbered(mesh, rng)) == canonical_hash(mesh)
@@ -298,6 +299,7 @@ def lies_flat(mesh: PolyMesh) -> bool:
     )
 
 
+@pytest.mark.slow
 def test_components_and_holes__are_the_parts_and_interiors_of_shapelys_union() -> None:
     found = []
     for seed in range(40):

@@ -110,6 +110,7 @@ def test_coverage__of_concave_polygons_equals_shapely(resolution: int) -> None:
         np.testing.assert_allclose(coverage(polygon(points), resolution), expected, rtol=0, atol=TOLERANCE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("resolution", [5, 64, 131])
 def test_coverage__of_shapes_with_a_hole_equals_shapely(resolution: int) -> None:
     cut = OPERATORS["face_hole"].apply(polygon(star(5, 9)), 1)
@@ -229,6 +230,7 @@ def test_gradient__of_a_rectangle_by_hand() -> None:
     np.testing.assert_allclose(gradient[~right, 0], -0.6)
 
 
+@pytest.mark.slow
 @given(meshes(), st.sampled_from([1, 8, 65]), st.integers(0, 99), st.floats(0.5, 3.0))
 @settings(max_examples=60)
 def test_loss__equals_the_dense_sum_also_outside_the_image(

@@ -217,6 +217,7 @@ def test_refit__keeps_its_promises(mesh: PolyMesh, silhouette: Silhouette, resol
     np.testing.assert_array_equal(again.mesh.vertices, result.mesh.vertices)
 
 
+@pytest.mark.slow
 @given(awkward_meshes(), silhouettes())
 @settings(max_examples=60)
 def test_refit__of_its_own_result_gains_and_breaks_nothing_more(mesh: PolyMesh, silhouette: Silhouette) -> None:

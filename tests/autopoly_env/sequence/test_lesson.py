@@ -87,6 +87,7 @@ def test_n_concave__judges_a_face_that_is_wound_backwards_as_its_mirror_image() 
     assert n_concave(backwards) == 0
 
 
+@pytest.mark.slow
 @given(meshes())
 def test_n_concave__is_what_shapely_says_of_simple_faces(mesh: PolyMesh) -> None:
     """A simple polygon is convex where it fills its convex hull."""
@@ -127,6 +128,7 @@ def test_w_locality__makes_a_step_leave_old_vertices_alone() -> None:
     assert all(is_sane(state.mesh) for state in held)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("symmetry", [None, 0.5])
 def test_w_locality__keeps_to_the_rules_of_a_simulator(symmetry: float | None) -> None:
     weights = ScoreWeights(w_locality=3.0)

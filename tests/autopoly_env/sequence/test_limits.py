@@ -54,6 +54,7 @@ def circle(n: int) -> str:
     return document_of(points, [step("face_split", {"face": 0, "vertex": 0}, {"to": n // 2}, [], [1])])
 
 
+@pytest.mark.slow
 def test_reading__takes_memory_in_proportion_to_the_file() -> None:
     peaks = []
     for n in (100, 400):

@@ -189,6 +189,7 @@ def test_face_split__is_always_followed_by_the_deletion_of_a_part(built: Built) 
     assert splits > 20
 
 
+@pytest.mark.slow
 def test_difficulty_range__is_drawn_evenly() -> None:
     source = ConstructionTargets((1, 3))
     n_changes = [

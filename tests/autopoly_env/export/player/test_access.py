@@ -7,7 +7,6 @@ from tests.helpers.constructions import house
 from tests.helpers.player import Open, wanted
 
 
-@pytest.mark.slow
 @needs_browser
 def test_every_control__has_a_name_and_a_role(play: Open) -> None:
     page = play(target=wanted())

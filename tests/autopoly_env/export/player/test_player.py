@@ -155,7 +155,6 @@ def test_motion__grows_an_extrusion_out_of_its_edge_and_then_moves_it(play: Open
     assert corner(1300) == pytest.approx((900, 700), abs=0.1)
 
 
-@pytest.mark.slow
 @needs_browser
 @pytest.mark.parametrize("seed", [3, 11])
 def test_motion__goes_through_any_construction_and_back(play: Open, seed: int) -> None:
