@@ -28,7 +28,8 @@ class Agent(ABC):
     name = "agent"
     config_class: ClassVar[type[Any] | None] = None  # a dataclass, all with defaults, that __init__ takes one of
     runs_simulations = False  # what a budget may limit
-    takes_guidance = True  # a start mesh, locked vertices and symmetry, which the transitions it plays keep to
+    takes_guidance = True  # a start mesh and locked vertices, which the transitions it plays keep to
+    takes_symmetry = True
     takes_faces = True  # a rule of faces, which these transitions keep as well
 
     def check(self, simulator: Simulator) -> None:
@@ -97,9 +98,10 @@ class Agent(ABC):
 
 
 class WholeAgent(Agent):
-    """Finds its shape as a whole instead of playing step by step, and so without guidance and rules of faces."""
+    """Finds its shape as a whole instead of playing step by step: as a rule without guidance and rules of faces."""
 
     takes_guidance = False
+    takes_symmetry = False
     takes_faces = False
 
     def act(self, simulator: Simulator, state: State) -> Decision:
@@ -128,10 +130,11 @@ def full_name(agent: Agent) -> str:
 
 def check_guidance(agent: Agent, names: Sequence[str]) -> None:
     """Raise ConfigError if an agent cannot take the guidance of these names (start, locked, symmetry)."""
-    if names and not agent.takes_guidance:
+    refused = [name for name in names if not (agent.takes_symmetry if name == "symmetry" else agent.takes_guidance)]
+    if refused:
         raise ConfigError(
-            f"{agent.name} finds outlines as a whole and cannot heed {names[0]!r}: choose an agent that plays step by "
-            "step, such as mcts, beam or greedy (docs/guidance.md)"
+            f"{agent.name} finds outlines as a whole and cannot heed {refused[0]!r}: choose an agent that plays step "
+            "by step, such as mcts, beam or greedy (docs/guidance.md)"
         )
 
 

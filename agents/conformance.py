@@ -39,8 +39,9 @@ def check_agent(
     simulator's operators; its scores are the simulator's and the last is the best; the same target gives the same
     sequence, whatever was solved in between. Progress is reported, and never goes back; a budget is overrun by one step
     of work at most, which may make `reports_a_step`; a KeyboardInterrupt in a report ends the search with a Solution.
-    `act` decides for legal actions. An agent that `takes_guidance` leaves locked vertices where they are and keeps
-    symmetry; another raises ConfigError. Every mesh of one that `takes_faces` keeps the rule; another raises, too.
+    `act` decides for legal actions. An agent that `takes_guidance` leaves locked vertices where they are, one that
+    `takes_symmetry` ends symmetric; another raises ConfigError. Every mesh of one that `takes_faces` keeps the rule;
+    another raises, too.
 
     Returns None, or raises ConformanceError naming the rule that was broken.
     """
@@ -78,7 +79,12 @@ def check_solution(solution: Solution, simulator: Simulator) -> None:
     scores = [sequence.start_score, *(step.score for step in sequence.steps)]
     for number, (mesh, score) in enumerate(zip(meshes, scores, strict=True)):
         _require(simulator.final_score(mesh).as_dict() == score, f"step {number}: the score is not its `final_score`")
-    if not simulator.weights.w_locality:  # which may make it worth its while to stop early
+    if simulator.guidance.axis is not None:
+        totals = [
+            score["total"] for mesh, score in zip(meshes, scores, strict=True) if simulator.guidance.is_symmetric(mesh)
+        ]
+        _require(max(totals, default=scores[-1]["total"]) == scores[-1]["total"], "it goes on after its best mesh")
+    elif not simulator.weights.w_locality:  # which may make it worth its while to stop early
         _require(sequence.best_prefix() == sequence, "the sequence goes on after its best mesh")
     n_new = len(sequence.steps) - (0 if simulator.guidance.earlier is None else len(simulator.guidance.earlier.steps))
     most = simulator.max_steps * (1 if simulator.guidance.axis is None else 2)  # an action and its mirror image
@@ -181,7 +187,7 @@ def _check_guidance(agent: Agent, silhouette: Silhouette, settings: dict[str, An
     wishes: tuple[dict[str, Any], ...] = ({"start": _START, "locked": (0, 1)}, {"symmetry": 0.5})
     for wish in wishes:
         simulator = Simulator(silhouette, **{**settings, **wish})
-        if not agent.takes_guidance:
+        if not (agent.takes_symmetry if "symmetry" in wish else agent.takes_guidance):
             what = f"it does not take guidance, yet does not refuse {', '.join(wish)} with a ConfigError"
             _require(_refuses(agent, simulator), what)
             continue

@@ -8,7 +8,7 @@ import typer
 
 from agents.commands import pictures
 from agents.commands.running import run_command
-from agents.commands.styles import DEFAULT_STYLE, describe_styles, style_named
+from agents.commands.styles import default_style, describe_styles, style_named
 from agents.names import AGENT_NAMES
 from autopoly_env.errors import AutoPolyError
 
@@ -23,11 +23,11 @@ Examples:
   python -m agents.solve chair.png --agent beam --option width=4 --refits 5000
   python -m agents.solve chair.png --agent my.module:MyAgent
   python -m agents.solve 'shapes/**/*.png' --json --quiet > scores.jsonl
-  python -m agents.solve mug.png --style modeller
+  python -m agents.solve mug.png --style paper
   python -m agents.solve mug.png --agent beam --faces quads
   python -m agents.solve mug.png --importance face.png
   python -m agents.solve mug.png --agent beam --start mug.obj --lock 0,3
-  python -m agents.solve vase.png --agent beam --symmetry auto
+  python -m agents.solve vase.png --agent beam --symmetry best
   python -m agents.solve gear.png --keep holes
   python -m agents.solve badge.png --object dark --show-mask
 
@@ -43,10 +43,10 @@ What in a picture is the object (docs/pictures-in.md) the notes tell; --object, 
 --alpha-threshold, --min-speck and --keep-specks say otherwise, and --show-mask writes mask.png.
 
 \b
-Guidance (docs/guidance.md): --importance is for every agent; --start, --lock
-and --symmetry are for those that play step by step: all but trace, climb,
-decimate, quads, dr-simple and dr-complex. --faces convex or quads is for all
-but trace, climb and decimate.
+Guidance (docs/guidance.md): --importance and --align are for every agent;
+--start, --lock and --symmetry are for those that play step by step: all but
+trace, climb, decimate, quads, dr-simple and dr-complex. quads takes --symmetry,
+too. --faces convex or quads is for all but trace, climb and decimate.
 
 \b
 Printed are the scores, at each image's own resolution, and the picture to open:
@@ -72,11 +72,12 @@ def solve(
         list[str], typer.Argument(metavar="IMAGE", help="Files, folders or patterns; ** crosses folders.")
     ],
     style: Annotated[
-        str,
+        str | None,
         typer.Option(
-            help=f"What the next three are by default: {describe_styles()} (docs/modelling.md).", show_default=True
+            help=f"What is built, and how: {describe_styles()} (docs/modelling.md).",
+            show_default="modeller; paper where the agent, its options, operators, faces or a start are given",
         ),
-    ] = DEFAULT_STYLE,
+    ] = None,
     agent: Annotated[
         str | None,
         typer.Option(
@@ -130,7 +131,18 @@ def solve(
     ] = None,
     symmetry: Annotated[
         str | None,
-        typer.Option(metavar="[auto|X]", help="Left and right alike, about the best axis or x = X (0 to 1)."),
+        typer.Option(
+            metavar="[auto|best|off|X]",
+            help="Left and right alike: auto where 99 % of the area is, about the best axis, or x = X (0 to 1).",
+            show_default="the style's",
+        ),
+    ] = None,
+    align: Annotated[
+        bool | None,
+        typer.Option(
+            help="What is nearly upright, level, parallel or of equal length becomes exactly so.",
+            show_default="the style's",
+        ),
     ] = None,
     keep: Annotated[
         str | None,
@@ -165,9 +177,10 @@ def solve(
     shown = read_columns(columns, FORMATS, COLUMNS)
     weights = ScoreWeights(w_sm, w_sc, w_si, w_locality)
     budget = Budget(refits, seconds, simulations)
-    wishes = read_wishes(importance, start, lock, symmetry, keep)
     options = _parse_options(option or [])
-    chosen = style_named(style).with_choices(agent, operators, faces)
+    named = default_style((agent, option, operators, faces, simulations, start, lock)) if style is None else style
+    chosen = style_named(named).with_choices(agent, operators, faces, symmetry, align)
+    wishes = read_wishes(importance, start, lock, chosen.symmetry, keep, chosen.align)
     picture = pictures.read_options(object_, background, threshold, alpha_threshold, min_speck, keep_specks)
     settings = Settings(
         chosen.agent,

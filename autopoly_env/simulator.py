@@ -63,8 +63,10 @@ class Simulator:
 
     A user may guide the construction (docs/guidance.md): `importance`, an image that says where matching matters;
     `start`, the mesh to begin with, or a sequence to go on from; `locked`, ids of its vertices that are neither moved
-    nor removed; `symmetry` about a vertical axis, x in 0..1, or True for the axis that suits the silhouette best;
-    `keep`, "holes", "parts" or "all": those of the picture that are to be in the mesh whatever they cost.
+    nor removed; `symmetry` about a vertical axis, x in 0..1, or True for the axis that suits the silhouette best, or
+    "auto" for that where the silhouette is symmetric to within 1 % of its area; `keep`, "holes", "parts" or "all":
+    those of the picture that are to be in the mesh whatever they cost; `align`: what is nearly upright, level, parallel
+    or of equal length is made exactly so in the end, where the IoU loses no more than 0.001.
 
     Raises ConfigError for settings that are out of range or contradict each other.
     """
@@ -82,8 +84,9 @@ class Simulator:
         importance: ImportanceSource | None = None,
         start: PolyMesh | ConstructionSequence | None = None,
         locked: Collection[int] = (),
-        symmetry: bool | float | None = None,
+        symmetry: bool | float | str | None = None,
         keep: str | None = None,
+        align: bool = False,
     ) -> None:
         resolution, max_steps = whole("resolution", resolution), whole("max_steps", max_steps)
         if not 8 <= resolution <= 1024:
@@ -92,7 +95,7 @@ class Simulator:
             raise ConfigError(f"match_threshold {match_threshold}: expected an IoU above 0, at most 1")
         self.faces = face_rule(faces)
         self.silhouette = silhouette if importance is None else weighted(silhouette, importance)
-        self.guidance = Guidance.of(self.silhouette, start, locked, symmetry, keep)
+        self.guidance = Guidance.of(self.silhouette, start, locked, symmetry, keep, align)
         self._check_start()
         self.operators = tuple(operator.name for operator in preset(operators))
         self.resolution = resolution

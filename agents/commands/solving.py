@@ -25,6 +25,7 @@ from autopoly_env.compute import n_threads
 from autopoly_env.errors import AutoPolyError, ConfigError
 from autopoly_env.export import save_png
 from autopoly_env.files import file_stem
+from autopoly_env.guidance import AUTO, asymmetry
 from autopoly_env.mesh import face_rule
 from autopoly_env.outside import described
 from autopoly_env.score import ScoreWeights
@@ -208,7 +209,8 @@ def _solve(job: Job, settings: Settings, out: Path, report: Report, ctrl_c: Ctrl
     sequence = replace(sequence, settings={**sequence.settings, **own})
     solution = replace(solution, sequence=sequence)
     files = write_results(out / job.name, solution, silhouette, ctrl_c.shielded, with_mask=settings.show_mask)
-    notes = [*job.notes, *silhouette.notes, *_notes_on_scoring(silhouette), *([lost] if lost else [])]
+    notes = [*job.notes, *silhouette.notes, *_notes_on_scoring(silhouette)]
+    notes += [*_notes_on_symmetry(settings, simulator), *([lost] if lost else [])]
     return Result(job.image, job.name, solution, tuple(notes), files, losses), silhouette
 
 
@@ -216,6 +218,15 @@ def _notes_on_scoring(silhouette: Silhouette) -> list[str]:
     if not silhouette.is_scored_by_area:
         return []
     return [f"fewer than {SMALL} pixels a side ({silhouette.resolution}): r_sm is of exact areas"]
+
+
+def _notes_on_symmetry(settings: Settings, simulator: Simulator) -> list[str]:
+    """That it was decided to build left and right alike, where the user did not say about which axis."""
+    axis = simulator.guidance.axis
+    if settings.wishes.symmetry != AUTO or axis is None:
+        return []
+    share = asymmetry(simulator.silhouette, axis)
+    return [f"left and right are alike ({share:.1%} differ): built so about x = {axis:g} (--symmetry off)"]
 
 
 def _write_overview(overview: Overview, out: Path, report: Report) -> Path | None:

@@ -1,5 +1,6 @@
-"""Styles of building: which agent, operators and rule of faces go together."""
+"""Styles of building: which agent, operators, rule of faces and regularities go together."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from autopoly_env.errors import ConfigError
@@ -12,18 +13,35 @@ class Style:
     agent: str
     operators: str
     faces: str
+    symmetry: str = "off"  # as the option: auto, best, off or the x of the axis
+    align: bool = False
 
-    def with_choices(self, agent: str | None, operators: str | None, faces: str | None) -> "Style":
-        """The style with what was chosen, None where nothing was, in place of its own."""
-        chosen = {"agent": agent, "operators": operators, "faces": faces}
-        return replace(self, **{name: value for name, value in chosen.items() if value is not None})
+    def with_choices(
+        self, agent: str | None, operators: str | None, faces: str | None, symmetry: str | None, align: bool | None
+    ) -> "Style":
+        """The style with what was chosen, None where nothing was, in place of its own.
+
+        Another agent than the style's own is asked for no symmetry of itself.
+        """
+        own = self if agent in (None, self.agent) else replace(self, symmetry="off")
+        return Style(
+            agent or own.agent,
+            operators or own.operators,
+            faces or own.faces,
+            symmetry or own.symmetry,
+            own.align if align is None else align,
+        )
+
+    def __str__(self) -> str:
+        regular = f" --symmetry {self.symmetry} --align" if self.align else ""
+        return f"--agent {self.agent} --operators {self.operators} --faces {self.faces}{regular}"
 
 
 STYLES = {
+    # convex quads and few triangles, extruded from the main body outwards, regular where the picture is
+    "modeller": Style("quads", "modeller", "quads", "auto", align=True),
     "paper": Style("mcts", "full", "any"),  # the highest r_all: outlines, told from coarse to fine
-    "modeller": Style("quads", "modeller", "quads"),  # convex quads and few triangles, extruded from the main body
 }
-DEFAULT_STYLE = "paper"
 
 
 def style_named(name: str) -> Style:
@@ -33,9 +51,11 @@ def style_named(name: str) -> Style:
     return STYLES[name]
 
 
+def default_style(told_otherwise: Iterable[object]) -> str:
+    """The style where none is named: the modeller's, unless something is given (not None) that names another way."""
+    return "modeller" if all(given is None for given in told_otherwise) else "paper"
+
+
 def describe_styles() -> str:
     """All of them in words, for help texts."""
-    return "; ".join(
-        f"{name} is --agent {style.agent} --operators {style.operators} --faces {style.faces}"
-        for name, style in STYLES.items()
-    )
+    return "; ".join(f"{name} is {style}" for name, style in STYLES.items())

@@ -7,7 +7,7 @@ from typing import Any
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import AutoPolyError, ConfigError
 from autopoly_env.export import load_obj
-from autopoly_env.guidance import KEPT, read_importance
+from autopoly_env.guidance import AUTO, KEPT, read_importance
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.sequence import ConstructionSequence
 
@@ -19,8 +19,9 @@ class Wishes:
     importance: FloatArray | None = None  # (H, W), 0 to 1
     start: PolyMesh | ConstructionSequence | None = None
     locked: tuple[int, ...] = ()
-    symmetry: bool | float | None = None
+    symmetry: bool | float | str | None = None
     keep: str | None = None  # holes, parts or all
+    align: bool = False
     files: dict[str, str] = field(default_factory=dict)  # by option, where it came from
 
     def for_simulator(self) -> dict[str, Any]:
@@ -31,6 +32,7 @@ class Wishes:
             "locked": self.locked,
             "symmetry": self.symmetry,
             "keep": self.keep,
+            "align": self.align,
         }
 
 
@@ -38,7 +40,12 @@ NO_WISHES = Wishes()
 
 
 def read_wishes(
-    importance: Path | None, start: Path | None, lock: str | None, symmetry: str | None, keep: str | None = None
+    importance: Path | None,
+    start: Path | None,
+    lock: str | None,
+    symmetry: str | None,
+    keep: str | None = None,
+    align: bool = False,
 ) -> Wishes:
     """The wishes behind the options as they were typed. Raises ConfigError that names the option that is wrong."""
     levels = None if importance is None else read_importance(importance)
@@ -47,7 +54,7 @@ def read_wishes(
     if keep is not None and keep not in KEPT:
         raise ConfigError(f"--keep {keep}: expected one of {', '.join(KEPT)}")
     named = {name: str(path) for name, path in files.items() if path}
-    return Wishes(levels, mesh, _ids(lock), _axis(symmetry), keep, named)
+    return Wishes(levels, mesh, _ids(lock), _axis(symmetry), keep, align, named)
 
 
 def _read_start(path: Path) -> PolyMesh | ConstructionSequence:
@@ -72,12 +79,15 @@ def _ids(text: str | None) -> tuple[int, ...]:
     return tuple(dict.fromkeys(ids))
 
 
-def _axis(text: str | None) -> bool | float | None:
-    if text is None:
-        return None
-    if text == "auto":
-        return True
+def _axis(text: str | None) -> bool | float | str | None:
+    match text:
+        case None | "off":
+            return None
+        case "auto":
+            return AUTO
+        case "best":
+            return True
     try:
         return float(text)
     except ValueError:
-        raise ConfigError(f"--symmetry {text}: expected auto, or the x of the axis, 0 to 1") from None
+        raise ConfigError(f"--symmetry {text}: expected auto, best, off, or the x of the axis, 0 to 1") from None

@@ -1,14 +1,15 @@
 """From the states that an agent has found to a solution: polished, pared, told without detours and scored.
 
 The order is: `pare` takes away what the shape does not need; `Simulator.polish` refits and tunes the last mesh at the
-silhouette's own resolution; the best prefix is recorded as a sequence; `tidy` leaves out its detours; `settle` lets
-vertices move less often.
+silhouette's own resolution; `aligned` makes it regular where that is asked for; the best prefix is recorded as a
+sequence; `tidy` leaves out its detours; `settle` lets vertices move less often.
 """
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 from agents.budget import Meter
+from agents.finish.align import aligned
 from agents.finish.pare import pare
 from agents.finish.settle import settle
 from agents.finish.tidy import tidy
@@ -56,10 +57,13 @@ def _told(simulator: Simulator, states: Sequence[State], meter: Meter, keep_step
     meshes = [state.mesh for state in states]
     if not keep_shape and (len(meshes) > 1 or simulator.guidance.start is None):
         meshes[-1] = _polished(simulator, meshes)
+        if simulator.guidance.align:
+            meshes[-1] = aligned(simulator, meshes[-1])
     scores = [simulator.final_score(mesh) for mesh in meshes]
     docked = [simulator.off(mesh) for mesh in meshes]
     docked[1:] = (off + simulator.docked(*pair) for off, pair in zip(docked[1:], pairwise(meshes), strict=True))
-    last = max(range(len(scores)), key=lambda k: (scores[k].total - docked[k], -k))
+    ends = [k for k, mesh in enumerate(meshes) if simulator.guidance.is_symmetric(mesh)] or list(range(len(meshes)))
+    last = max(ends, key=lambda k: (scores[k].total - docked[k], -k))
     settings = {**simulator.settings(), "scored_at": simulator.silhouette.resolution}
     transitions = [
         transition

@@ -42,6 +42,7 @@ class QuadsAgent(WholeAgent):
 
     name = "quads"
     takes_faces = True
+    takes_symmetry = True
     config_class = QuadsConfig
 
     def __init__(self, config: QuadsConfig) -> None:
@@ -100,7 +101,8 @@ def best_build(hill: QuadHill, places: Sequence[QuadPlace], n_polished: int) -> 
             states = build(hill.simulator, meshes[k])[: hill.simulator.max_steps + 1]
         except UnbuildableError:
             continue
-        total = max(hill.simulator.worth(state.mesh) for state in states)
+        ends = [state.mesh for state in states if hill.simulator.guidance.is_symmetric(state.mesh)]
+        total = max(map(hill.simulator.worth, ends), default=most)
         if total > most:
             chosen, most = states, total
     return chosen

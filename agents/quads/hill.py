@@ -6,6 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from agents.climb.moves import neighbours
+from agents.finish.align import aligned
+from agents.quads.mirror import symmetric_neighbours, symmetrised
 from agents.quads.moves import quad_neighbours, quad_shaken
 from agents.quads.partition import MOST_BENT, Partition, bent, least_faces, mesh_of, partitioned
 from agents.trace.outline import Outline
@@ -41,6 +43,7 @@ class QuadHill:
         self.simulator = simulator
         self.contours = trace_rings(simulator.silhouette)
         self._pixels = simulator.silhouette.target(simulator.finest)
+        self.axis = simulator.guidance.axis  # about which outlines are symmetric, None where they need not be
 
     def place(self, outline: Outline) -> QuadPlace:
         """The outline as it is, cut at its best, or bent a little where that saves faces."""
@@ -52,7 +55,7 @@ class QuadHill:
         relaxed = partitioned(outline, MOST_BENT)
         if relaxed is None or (partition is not None and len(relaxed.faces) >= len(partition.faces)):
             return place
-        mesh = bent(mesh_of(outline, relaxed))
+        mesh = bent(mesh_of(outline, relaxed), self.simulator.guidance.bonds(outline.loops))
         if mesh is None:
             return place
         moved = outline.moved(outline.loops.with_vertices(mesh.vertices))
@@ -77,7 +80,19 @@ class QuadHill:
     def fit(self, outlines: list[Outline], config: RefitConfig, iou: float) -> list[QuadPlace]:
         """Each outline refitted, on all cores, on the way to more than `iou`."""
         target = self.simulator.refit_target(iou)
-        return map_threads(lambda outline: self.place(outline.refitted(target, config)), outlines)
+
+        def fitted(outline: Outline) -> QuadPlace:
+            bonds = self.simulator.guidance.bonds(outline.loops)
+            return self.place(outline.refitted(target, config, bonds))
+
+        return map_threads(fitted, outlines)
+
+    def symmetric(self, outline: Outline) -> list[Outline]:
+        """The outline, or under symmetry what comes of its right half and of its left one."""
+        if self.axis is None:
+            return [outline]
+        halves = [symmetrised(outline, self.axis, side) for side in (1, -1)]
+        return [half for half in halves if half is not None and self.simulator.guidance.is_symmetric(half.loops)]
 
     def neighbours(self, place: QuadPlace, n_blamed: int) -> list[Outline]:
         """Outlines that are one move away, the most promising first: those that are worth most as they are."""
@@ -85,18 +100,24 @@ class QuadHill:
         found = list(neighbours(place.outline, silhouette, self.contours, n_blamed, holes=True))
         if place.partition is not None:
             found += quad_neighbours(place.outline, place.partition, silhouette, n_blamed)
+        if self.axis is not None:
+            found = list(symmetric_neighbours(found, place.outline, self.axis))
         likely = [found[k] for k in _best_first(map_threads(self.promise, found))[:_N_LIKELY]]
         return [likely[k] for k in _best_first(map_threads(lambda outline: self.place(outline).total, likely))]
 
     def polished(self, place: QuadPlace) -> list[PolyMesh]:
-        """The mesh of a place, refitted and tuned under the rule at the finest resolution; none if it has defects."""
+        """The mesh of a place, polished under the rule and, if asked for, aligned; none if it has defects."""
         assert place.partition is not None
         mesh = mesh_of(place.outline, place.partition)
-        return [self.simulator.polish(mesh)] if is_sane(mesh, "quads") else []
+        if not is_sane(mesh, "quads"):
+            return []
+        mesh = self.simulator.polish(mesh)
+        return [aligned(self.simulator, mesh) if self.simulator.guidance.align else mesh]
 
     def shaken(self, place: QuadPlace, rng: np.random.Generator) -> Outline:
         """An outline a few random moves away."""
-        return quad_shaken(place.outline, self.simulator.silhouette, rng)
+        found = self.symmetric(quad_shaken(place.outline, self.simulator.silhouette, rng))
+        return found[int(rng.integers(len(found)))] if found else place.outline
 
 
 def _best_first(worth: Sequence[float]) -> list[int]:

@@ -14,6 +14,8 @@ from agents.trace.outline import Outline
 from autopoly_env.arrays import FloatArray
 from autopoly_env.mesh import Face, PolyMesh, Topology, is_sane
 from autopoly_env.mesh.corner_kernels import turns
+from autopoly_env.mesh.symmetry import mirrored
+from autopoly_env.refit import Bonds
 
 LEAST_SINE = 0.02  # of the turn at every corner of a face
 MOST_CORNERS = 160  # of one part and its holes that are cut exactly; the time grows with the fourth power
@@ -65,10 +67,15 @@ def least_faces(outline: Outline) -> int:
     return n_faces
 
 
-def bent(mesh: PolyMesh) -> PolyMesh | None:
-    """The mesh with vertices moved so that all faces are convex; None where that takes too much."""
+def bent(mesh: PolyMesh, bonds: Bonds | None = None) -> PolyMesh | None:
+    """The mesh with vertices moved so that all faces are convex; None where that takes too much.
+
+    Mirror images by `bonds` move alike.
+    """
     topology, points = mesh.topology, mesh.vertices.copy()
     partition_kernels.bend(points, topology.corners, topology.face_offsets, BENT_SINE, _N_ROUNDS)
+    if bonds is not None and (bonds.images >= 0).all():
+        points = 0.5 * (points + mirrored(points[bonds.images], bonds.axis))
     if turns(points, topology.corners, topology.face_offsets).min() < LEAST_SINE:
         return None
     moved = mesh.with_vertices(np.clip(points, 0.0, 1.0))

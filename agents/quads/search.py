@@ -1,7 +1,7 @@
 """Search among outlines that are cut into quads: climbs from traced outlines, then hops from top to top."""
 
 from collections.abc import Iterator
-from itertools import islice
+from itertools import chain, islice
 
 import numpy as np
 
@@ -112,7 +112,8 @@ def _seeds(hill: QuadHill, meter: Meter) -> Iterator[QuadPlace]:
         seeds: dict[tuple[int, ...], QuadPlace] = {}
         for silhouette in silhouettes:
             rings = trace_rings(silhouette)
-            for outline in TraceAgent(TraceConfig(prices=_PRICES)).sweep(hill.simulator, rings, _REACH):
+            swept = TraceAgent(TraceConfig(prices=_PRICES)).sweep(hill.simulator, rings, _REACH)
+            for outline in chain.from_iterable(map(hill.symmetric, swept)):
                 if meter.spent():
                     break
                 [place] = hill.fit([outline], LOCAL, hill.place(outline).score.iou)

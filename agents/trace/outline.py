@@ -9,8 +9,9 @@ import numpy as np
 import shapely
 
 from agents.trace.rings import Ring, signed_area
+from autopoly_env.arrays import FloatArray
 from autopoly_env.mesh import PolyMesh, Topology
-from autopoly_env.refit import RefitConfig, RefitTarget, refit
+from autopoly_env.refit import Bonds, RefitConfig, RefitTarget, refit
 from autopoly_env.score import Score, ScoreWeights, intersection_over_union, self_intersections
 from autopoly_env.silhouette import Target
 from autopoly_env.simulator import MANY_VERTICES
@@ -59,9 +60,9 @@ class Outline:
         total = weights.w_sm * iou - weights.w_sc * self.complexity - weights.w_si * crossings
         return Score(iou, self.complexity, crossings, total)
 
-    def refitted(self, target: RefitTarget, config: RefitConfig) -> "Outline":
-        """The rings moved to match the target."""
-        return self.moved(refit(self.loops, target, config).mesh)
+    def refitted(self, target: RefitTarget, config: RefitConfig, bonds: Bonds | None = None) -> "Outline":
+        """The rings moved to match the target, as far as bonds of `loops` let them."""
+        return self.moved(refit(self.loops, target, config, bonds).mesh)
 
     def moved(self, loops: PolyMesh) -> "Outline":
         """The rings at the positions of `loops`."""
@@ -97,11 +98,16 @@ def outline_of(kept: Sequence[Ring], among: Sequence[Ring]) -> Outline:
 
 def outline_of_mesh(mesh: PolyMesh) -> Outline | None:
     """The outline of a mesh, its largest part first; None where its loops do not nest."""
-    loops = [mesh.vertices[loop] for loop in mesh.topology.boundary_loops]
+    return nested([mesh.vertices[loop] for loop in mesh.topology.boundary_loops])
+
+
+def nested(loops: Sequence[FloatArray]) -> Outline | None:
+    """The outline of closed polygons (n, 2), wound as rings are; None where one is a hole in nothing."""
     outer = sorted((loop for loop in loops if signed_area(loop) > 0.0), key=signed_area, reverse=True)
-    polygons = [shapely.Polygon(loop) for loop in outer]
     rings = [Ring(loop, -1) for loop in outer]
-    for hole in (loop for loop in loops if signed_area(loop) < 0.0):
+    holes = [loop for loop in loops if signed_area(loop) < 0.0]
+    polygons = [shapely.Polygon(loop) for loop in outer if holes]
+    for hole in holes:
         middle = shapely.Polygon(hole).representative_point() if shapely.Polygon(hole).is_valid else None
         inside = [k for k, polygon in enumerate(polygons) if middle is not None and polygon.contains(middle)]
         if not inside:

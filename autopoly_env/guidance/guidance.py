@@ -12,7 +12,7 @@ import numpy as np
 
 from autopoly_env.arguments import number
 from autopoly_env.errors import ConfigError, IllegalActionError, MeshError
-from autopoly_env.guidance.symmetry import best_axis
+from autopoly_env.guidance.symmetry import asymmetry, best_axis
 from autopoly_env.mesh import PolyMesh, canonical_hash, defects_of, images_of, validate
 from autopoly_env.operators import OPERATORS, Action, describe
 from autopoly_env.refit import Bonds
@@ -21,7 +21,9 @@ from autopoly_env.shown import short
 from autopoly_env.silhouette import Silhouette
 
 MOST_CORNERS = 2000  # of a mesh to start from: a refit takes memory by their square
+MOST_ASYMMETRIC = 0.01  # of its area, with which a silhouette is taken to be symmetric where that is decided by itself
 _LEAST_ROOM = 1 / 64  # beside an axis, in the unit square
+AUTO = "auto"
 KEPT = {"holes": ("holes",), "parts": ("parts",), "all": ("holes", "parts")}  # what may be asked to be kept
 
 
@@ -33,6 +35,7 @@ class Guidance:
     earlier: ConstructionSequence | None = None  # what led to `start`, if it was given
     locked: frozenset[int] = frozenset()  # ids of vertices that stay, and stay where they are
     axis: float | None = None  # x of the axis about which the outline is symmetric
+    align: bool = False  # edges that are nearly upright, level, parallel or of equal length are to be exactly so
     keep: tuple[str, ...] = ()  # "holes", "parts": each of the picture's is to be one of the mesh's, whatever it costs
 
     @classmethod
@@ -41,18 +44,19 @@ class Guidance:
         silhouette: Silhouette,
         start: PolyMesh | ConstructionSequence | None,
         locked: Collection[int],
-        symmetry: bool | float | None,
+        symmetry: bool | float | str | None,
         keep: str | None = None,
+        align: bool = False,
     ) -> "Guidance":
         """See `Simulator` for the arguments. Raises ConfigError for what is impossible or contradicts itself."""
         earlier, mesh = (start, start.final()) if isinstance(start, ConstructionSequence) else (None, start)
         if mesh is not None:
             _check_start(mesh)
         _check_locked(mesh, locked)
-        axis = None if symmetry is None or symmetry is False else _axis(silhouette, symmetry)
+        axis = _axis(silhouette, mesh, symmetry)
         if keep is not None and keep not in KEPT:
             raise ConfigError(f"keep {keep!r}: expected one of {', '.join(KEPT)}")
-        guidance = cls(mesh, earlier, frozenset(map(int, locked)), axis, () if keep is None else KEPT[keep])
+        guidance = cls(mesh, earlier, frozenset(map(int, locked)), axis, align, () if keep is None else KEPT[keep])
         if mesh is not None and axis is not None:
             guidance.check_symmetric(mesh)
             _check_images_locked(mesh, guidance.locked, axis)
@@ -75,6 +79,8 @@ class Guidance:
             values["locked"] = sorted(self.locked)
         if self.axis is not None:
             values["symmetry"] = self.axis
+        if self.align:
+            values["align"] = True
         if self.keep:
             values["keep"] = ",".join(self.keep)
         return values
@@ -174,7 +180,16 @@ def _check_locked(mesh: PolyMesh | None, locked: Collection[int]) -> None:
         raise ConfigError(f"locked vertex {unknown[0]} is not in the start mesh: its ids are {ids}")
 
 
-def _axis(silhouette: Silhouette, symmetry: bool | float) -> float:
+def _axis(silhouette: Silhouette, start: PolyMesh | None, symmetry: bool | float | str | None) -> float | None:
+    if symmetry is None or symmetry is False:
+        return None
+    if symmetry == AUTO:
+        axis = best_axis(silhouette)
+        if asymmetry(silhouette, axis) > MOST_ASYMMETRIC or not _LEAST_ROOM <= axis <= 1.0 - _LEAST_ROOM:
+            return None
+        return None if start is not None and images_of(start, axis) is None else axis
+    if isinstance(symmetry, str):
+        raise ConfigError(f"symmetry {symmetry!r}: expected {AUTO!r}, True or the x of the axis")
     axis = best_axis(silhouette) if symmetry is True else number("symmetry", symmetry)
     if not _LEAST_ROOM <= axis <= 1.0 - _LEAST_ROOM:
         raise ConfigError(f"symmetry about x = {axis:g}: expected an axis well inside the unit square, such as 0.5")

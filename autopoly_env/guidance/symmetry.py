@@ -1,4 +1,4 @@
-"""Left and right alike: the vertical line about which a silhouette is most symmetric."""
+"""Left and right alike: the vertical line about which a silhouette is most symmetric, and how much so it is."""
 
 import numpy as np
 
@@ -18,3 +18,17 @@ def best_axis(silhouette: Silhouette) -> float:
     axes = (np.flatnonzero(overlaps == overlaps.max()) + 1) / (2 * size)
     centre = (np.nonzero(mask)[1].mean() + 0.5) / size
     return float(axes[np.argmin(np.abs(axes - centre))])
+
+
+def asymmetry(silhouette: Silhouette, axis: float) -> float:
+    """Area of the object that is not also its mirror image's about an axis, and the other way round, over its own.
+
+    The axis counts as the nearest multiple of half a pixel.
+    """
+    mask = silhouette.mask
+    size = len(mask)
+    columns = round(2.0 * axis * size) - 1 - np.arange(size)
+    inside = (columns >= 0) & (columns < size)
+    image = np.zeros_like(mask)
+    image[:, inside] = mask[:, columns[inside]]
+    return float((mask ^ image).sum() / max(mask.sum(), 1))

@@ -96,7 +96,8 @@ def test_agents_that_find_wholes__take_importance_and_nothing_else(name: str) ->
     rules = RULES.get(name, {})
     game = Simulator(painted(L_SHAPE), resolution=32, importance=np.where(LEFT, 1.0, 0.3), **rules)
     assert solve(name, game, refits=10).sequence.settings["importance"]
-    for guidance in ({"start": START}, {"start": START, "locked": (0,)}, {"symmetry": True}):
+    symmetric = () if name == "quads" else ({"symmetry": True},)
+    for guidance in ({"start": START}, {"start": START, "locked": (0,)}, *symmetric):
         with pytest.raises(ConfigError, match=f"{name} .* cannot heed '(start|symmetry)'.* greedy"):
             solve(name, Simulator(painted(L_SHAPE), resolution=32, **guidance, **rules))
 

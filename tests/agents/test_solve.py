@@ -22,6 +22,7 @@ from agents.commands.results import RESULTS
 from agents.entry import entry_of
 from agents.registry import AGENTS
 from agents.solve import main
+from autopoly_env.mesh import images_of
 from autopoly_env.score import ScoreWeights, score
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import load_silhouette
@@ -100,7 +101,7 @@ def test_solve__records_a_sequence_that_replays_to_the_mesh(run: Run) -> None:
     mesh = sequence.final()
     assert len(sequence.steps) == record["actions"] > 0
     assert sequence.settings == record["settings"]
-    assert (sequence.settings["agent"], sequence.settings["seed"]) == ("mcts", 7)
+    assert (sequence.settings["agent"], sequence.settings["seed"]) == ("quads", 7)
     assert np.allclose(read_obj(record["files"]["mesh.obj"])[0], mesh.vertices)
     target = load_silhouette(EXAMPLES / "mug.png").target(512)
     assert score(mesh, target, ScoreWeights()).total == record["r_all"] == sequence.steps[-1].score["total"]
@@ -528,9 +529,35 @@ def test_style__brings_agent_operators_and_rule_unless_they_are_given(run: Run) 
     assert json.loads(run(image, "--agent", "trace", *quick).out)["settings"].get("faces", "any") == "any"
 
 
+@pytest.mark.slow
+def test_style__is_the_modellers_unless_another_way_is_named(run: Run) -> None:
+    image, quick = EXAMPLES / "bottle.png", ("--refits", 60, "--json", "--quiet")
+    alone = json.loads(run(image, *quick).out)["settings"]
+    assert (alone["agent"], alone["faces"], alone["align"]) == ("quads", "quads", True)
+    named = json.loads(run(image, "--operators", "full", *quick).out)["settings"]
+    assert (named["agent"], named.get("faces", "any"), "align" in named) == ("mcts", "any", False)
+    chosen = json.loads(run(image, "--style", "modeller", "--agent", "greedy", "--no-align", *quick).out)["settings"]
+    assert (chosen["agent"], chosen["faces"], "align" in chosen, "symmetry" in chosen) == (
+        "greedy", "quads", False, False,
+    )  # fmt: skip
+
+
+@pytest.mark.slow
+def test_symmetric_picture__is_built_so_and_said_to_be(run: Run) -> None:
+    mask = np.zeros((64, 64), np.bool_)
+    mask[10:20, 8:56] = mask[20:50, 12:18] = mask[20:50, 46:52] = True
+    Image.fromarray(mask).save("table.png")
+    said = " ".join(run("table.png", "--refits", 60).out.split())
+    assert "left and right are alike (0.0% differ): built so about x = 0.5 (--symmetry off)" in said
+    sequence = ConstructionSequence.load(Path("out/table/sequence.json"))
+    assert sequence.settings["symmetry"] == 0.5 and images_of(sequence.final(), 0.5) is not None
+    run("table.png", "--refits", 60, "--symmetry", "off")
+    assert "symmetry" not in ConstructionSequence.load(Path("out/table/sequence.json")).settings
+
+
 def test_style__that_is_none_and_operators_that_are_missing_are_told_before_the_work(run: Run) -> None:
     refused = run(EXAMPLES / "key.png", "--style", "cubist")
-    assert refused.code == 2 and "--style cubist: expected one of paper, modeller" in refused.err
+    assert refused.code == 2 and "--style cubist: expected one of modeller, paper" in refused.err
     refused = run(EXAMPLES / "key.png", "--style", "modeller", "--operators", "full")
     assert refused.code == 2 and "edge_cap is not among the operators: give the preset modeller" in refused.err
 

@@ -6,7 +6,8 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopoly_env.guidance import best_axis
+from autopoly_env.errors import ConfigError
+from autopoly_env.guidance import asymmetry, best_axis
 from autopoly_env.mesh import PolyMesh, defects_of, images_of, is_valid
 from autopoly_env.operators import STOP, Action, legal_actions
 from autopoly_env.refit import shape_kernels
@@ -107,3 +108,20 @@ def test_symmetry__doubles_actions_that_are_not_their_own_image() -> None:
     assert top.mesh.counts == (5, 5, 1) and top.halfway is None and top.mesh.vertices[4, 0] == 0.5
     bottle = max(game.transition_all(state), key=lambda child: child.score.total)
     assert bottle.mesh.counts == (6, 6, 1) and bottle.score.iou > 0.99
+
+
+@pytest.mark.parametrize(("n_more", "axis"), [(0, 0.5), (12, 0.5), (20, None)])
+def test_auto__is_symmetry_where_all_but_a_hundredth_of_the_area_is(n_more: int, axis: float | None) -> None:
+    mask = np.zeros((64, 64), np.bool_)
+    mask[8:56, 4:60] = True  # 2688 pixels, about x = 0.5
+    mask[8 : 8 + n_more // 4, 60:64] = True  # to one side only
+    silhouette = Silhouette(mask)
+    assert asymmetry(silhouette, 0.5) == pytest.approx(2 * n_more / (2688 + n_more))  # there, and missing in the image
+    assert Simulator(silhouette, resolution=32, symmetry="auto").guidance.axis == axis
+
+
+def test_auto__gives_way_to_a_start_that_is_not_symmetric() -> None:
+    start = PolyMesh.from_faces([(0.2, 0.2), (0.9, 0.3), (0.7, 0.8), (0.2, 0.8)], [(0, 1, 2, 3)])
+    assert Simulator(painted(BOTTLE), start=start, symmetry="auto").guidance.axis is None
+    with pytest.raises(ConfigError, match="symmetry 'left': expected 'auto', True or the x of the axis"):
+        Simulator(painted(BOTTLE), symmetry="left")
