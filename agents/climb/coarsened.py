@@ -11,9 +11,12 @@ _RADII = (0.012, 0.025, 0.04, 0.06)  # unit square
 _RESOLUTION = 256  # pixels a side that are enough to see them by
 
 
-def variants(silhouette: Silhouette) -> Iterator[Silhouette]:
-    """Openings and closings of the silhouette by growing discs, each that differs from the one before."""
-    size = min(_RESOLUTION, silhouette.resolution)
+def variants(silhouette: Silhouette, resolution: int = _RESOLUTION) -> Iterator[Silhouette]:
+    """Openings and closings of the silhouette by growing discs, each that differs from the one before.
+
+    They have `resolution` pixels a side at most.
+    """
+    size = min(resolution, silhouette.resolution)
     mask = silhouette.target(size).mask
     margin = int(np.ceil(_RADII[-1] * size)) + 1  # so that the border of the picture is no border of the shape
     padded = np.pad(mask, margin)

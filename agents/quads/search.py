@@ -1,6 +1,7 @@
 """Search among outlines that are cut into quads: climbs from traced outlines, then hops from top to top."""
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterable, Iterator
 from itertools import chain, islice
 
 import numpy as np
@@ -10,13 +11,17 @@ from agents.climb.coarsened import variants
 from agents.quads.hill import QuadHill, QuadPlace, total_of
 from agents.trace.agent import TraceAgent, TraceConfig
 from agents.trace.reach import Reach
-from agents.trace.rings import trace_rings
+from agents.trace.rings import Ring, trace_rings
 from autopoly_env.refit import LOCAL, THOROUGH
 
 _PRICES = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 6.0)  # of a vertex, of what it costs without inner edges
 _REACH = Reach(more_than_quads=True, holes=True, parts=True, triangles=True, n_steps=10_000)
 _N_SEEDS = 8  # of traced outlines
-_N_FIRST = 4  # of them that are climbed from before anything else
+_N_OWN = 2  # of the silhouette as it is, before thin parts and gaps are looked at
+_ROUGH = 128  # pixels a side, by which thin parts and gaps are seen
+_PER_OCTAVE = 2.0  # kinds of outlines in each doubling of their vertices
+_N_HOLES = 3  # so many holes at most are left out of all but one of the contours that outlines are made of
+_N_FIRST = 5  # of them that are climbed from before anything else
 _SEED_EVERY = 3  # hops, another one
 _LOOK_EVERY = 10  # hops, all neighbours of the best top are tried
 _N_AT_ONCE = 16  # of the neighbours
@@ -107,18 +112,44 @@ def _hop_from(
 
 
 def _seeds(hill: QuadHill, meter: Meter) -> Iterator[QuadPlace]:
-    """The best outlines of the silhouette and of changed ones, of each number of vertices in each ring one."""
-    for n_most, silhouettes in ((_N_SEEDS, [hill.simulator.silhouette]), (3, variants(hill.simulator.silhouette))):
-        seeds: dict[tuple[int, ...], QuadPlace] = {}
-        for silhouette in silhouettes:
-            rings = trace_rings(silhouette)
-            swept = TraceAgent(TraceConfig(prices=_PRICES)).sweep(hill.simulator, rings, _REACH)
-            for outline in chain.from_iterable(map(hill.symmetric, swept)):
-                if meter.spent():
-                    break
-                [place] = hill.fit([outline], LOCAL, hill.place(outline).score.iou)
-                meter.count(1, place.total)
-                sizes = tuple(sorted(len(ring.points) for ring in outline.rings))
-                if sizes not in seeds or seeds[sizes].total < place.total:
-                    seeds[sizes] = place
-        yield from sorted(seeds.values(), key=total_of, reverse=True)[:n_most]
+    """Traced outlines to climb from: of the silhouette, with fewer holes, and with thin parts or gaps gone."""
+    rings = trace_rings(hill.simulator.silhouette)
+    n_outer = sum(not ring.is_hole for ring in rings)
+    fewer = [rings[:n] for n in range(n_outer, min(len(rings), n_outer + _N_HOLES))]
+    own = _fitted(hill, [rings, *fewer], meter)
+    first = _best_of_each_kind(own, hill)[:_N_OWN]
+    yield from first
+    changed = variants(hill.simulator.silhouette, _ROUGH)
+    others = _best_of_each_kind(own + _fitted(hill, map(trace_rings, changed), meter), hill)
+    yield from [place for place in others if all(place is not known for known in first)][:_N_SEEDS]
+
+
+def _fitted(hill: QuadHill, contours: Iterable[list[Ring]], meter: Meter) -> list[QuadPlace]:
+    """The outlines of some contours at all prices, refitted."""
+    places: list[QuadPlace] = []
+    for rings in contours:
+        if meter.spent():
+            break
+        swept = TraceAgent(TraceConfig(prices=_PRICES)).sweep(hill.simulator, rings, _REACH)
+        outlines = meter.affordable(list(chain.from_iterable(map(hill.symmetric, swept))))
+        iou = max((hill.place(outline).score.iou for outline in outlines), default=1.0)
+        places += hill.fit(outlines, LOCAL, iou)
+        meter.count(len(outlines), max(map(total_of, places), default=float("-inf")))
+    return places
+
+
+def _best_of_each_kind(places: Iterable[QuadPlace], hill: QuadHill) -> list[QuadPlace]:
+    """The best with each number of rings, then with each number of vertices, about, then the others."""
+    ordered = sorted(places, key=total_of, reverse=True)
+    least = ordered[0].total - _HOPELESS * max(hill.simulator.weights.w_sc, _LEAST_PRICE) if ordered else 0.0
+    seen: set[tuple[int, ...]] = set()
+    tiers: tuple[list[QuadPlace], ...] = ([], [], [])
+    for place in ordered:
+        n_rings, octave = len(place.outline.rings), round(_PER_OCTAVE * math.log2(len(place.outline.loops.vertices)))
+        tier = 0 if (n_rings,) not in seen else 1 if (n_rings, octave) not in seen else 2
+        if place.total <= least:
+            tier = 2
+        seen |= {(n_rings,), (n_rings, octave)}
+        if all(abs(place.total - other.total) > _SAME for other in chain.from_iterable(tiers)):
+            tiers[tier].append(place)
+    return list(chain.from_iterable(tiers))
