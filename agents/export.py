@@ -4,7 +4,7 @@ import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 DEFAULT = "html"
 _CHECK = "autopoly_env.conformance.check_format shows where"
 
-_FORMATS = "\n".join(f"  {name:8} {line}" for name, _, line in LISTED)
+_FORMATS = "\n".join(f"  {name:11} {line}" for name, _, line in LISTED)
 
 HELP = f"""Write construction sequences in another format.
 
@@ -33,6 +33,7 @@ Examples:
   python -m agents.export out/chair/sequence.json --out chair.obj
   python -m agents.export out/chair/sequence.json --to svg --step 4
   python -m agents.export out/*/sequence.json --to gltf --depth 0.1 --out glTF
+  python -m agents.export out/key/sequence.json --to stl --depth 0.05 --size 80
 
 \b
 Formats:
@@ -78,6 +79,14 @@ def export(
     depth: Annotated[
         float, typer.Option(help="Thickness of the mesh, in units of the unit square, in formats that show it.")
     ] = 0.0,
+    size: Annotated[
+        float | None,
+        typer.Option(
+            metavar="MM", help="Side of the picture, in millimetres, in formats for machines.", show_default="100"
+        ),
+    ] = None,
+    triangles: Annotated[bool, typer.Option("--triangles", help="Cut faces into triangles (obj).")] = False,
+    layers: Annotated[bool, typer.Option("--layers", help="All steps, a layer each (svg).")] = False,
     operators: OutsideOperators = None,
     object_: pictures.Object = "auto",
     background: pictures.Background = None,
@@ -98,12 +107,7 @@ def export(
     if target is None and (show_mask or pictures.as_dict(picture)):
         raise ConfigError("--object, --show-mask and the like are about the picture of --target; give one")
     made = _choose(to, out, len(sources))
-    if depth and not made.shows_depth:
-        able = [name for name, other in formats().items() if other.shows_depth]
-        raise ConfigError(f"--depth {depth}: {made.name} is flat; use it with {', '.join(able)}")
-    if target and not made.shows_target:
-        able = [name for name, other in formats().items() if other.shows_target]
-        raise ConfigError(f"--target {target}: {made.name} shows no target; use it with {', '.join(able)}")
+    _refuse_what_is_not_shown(made, depth=depth, target=target, size=size, triangles=triangles, layers=layers)
     jobs = list(_name_outputs(sources, out, made.suffix))
     silhouette = load_silhouette(target, options=picture) if target else None
     if silhouette is not None and show_mask:
@@ -111,7 +115,7 @@ def export(
     n_failed = 0
     for source, goal in jobs:
         try:
-            _write(made, Export(_load(source, step), silhouette, depth), goal)
+            _write(made, Export(_load(source, step), silhouette, depth, size, triangles, layers), goal)
             print(tame(str(goal)))
         except ConfigError:
             raise
@@ -141,6 +145,19 @@ def _choose(to: str | None, out: Path | None, n: int) -> Format:
         endings = " or ".join(named.suffixes)
         raise ConfigError(f"--out {out} with --to {to}: expected a file name that ends in {endings}; leave one out")
     return named
+
+
+_WHY = {"depth": "is flat", "target": "shows no target", "size": "has a size of its own"}
+
+
+def _refuse_what_is_not_shown(made: Format, **given: Any) -> None:
+    """Raise ConfigError for an option that the format does not heed; 0, no and None ask for nothing."""
+    for name, value in given.items():
+        if value is None or value is False or (name == "depth" and not value) or name in made.heeded:
+            continue
+        able = ", ".join(other.name for other in formats().values() if name in other.heeded)
+        shown = f"--{name}" if value is True else f"--{name} {value}"
+        raise ConfigError(f"{shown}: {made.name} {_WHY.get(name, 'has nothing of the kind')}; use it with {able}")
 
 
 def _write(made: Format, export: Export, goal: Path) -> None:

@@ -24,6 +24,9 @@ class Export:
     sequence: "ConstructionSequence"
     target: "Silhouette | None" = None
     depth: float = 0.0  # thickness of the mesh, in units of the unit square
+    size: float | None = None  # side of the unit square, in millimetres or pixels; None: the format's own
+    triangles: bool = False  # no other faces
+    layers: bool = False  # all steps, each in a layer, where otherwise the last mesh is shown
 
 
 @dataclass(frozen=True)
@@ -40,10 +43,17 @@ class Format:
     write: Callable[[Export, Path], object]
     shows_target: bool = False
     shows_depth: bool = False
+    options: tuple[str, ...] = ()  # further fields of an `Export` that it heeds, such as "size"
 
     def __post_init__(self) -> None:
         if not self.suffixes or not all(s.startswith(".") and s == s.lower() for s in self.suffixes):
             raise ConfigError(f"format {self.name!r} with the endings {self.suffixes}: expected some, such as .obj")
+
+    @property
+    def heeded(self) -> set[str]:
+        """The fields of an `Export` that it heeds, beside the sequence."""
+        shown = {"target": self.shows_target, "depth": self.shows_depth}
+        return {name for name, is_shown in shown.items() if is_shown} | set(self.options)
 
     @property
     def suffix(self) -> str:
@@ -51,18 +61,29 @@ class Format:
         return self.suffixes[0]
 
 
+MOST_SIZE = 1e6
+
 # Name, module, and the line of help that is also in there: `--help` has no time to load them.
 LISTED = (
     ("html", "player", "the player: a page to watch, with what to press in Blender"),
-    ("svg", "svg", "a drawing to edit, a layer for each step, the last one visible"),
-    ("obj", "obj", "the last mesh, with its n-gons; a solid of them with --depth"),
+    ("svg", "svg", "a drawing of the last mesh to edit; all steps with --layers"),
+    ("obj", "obj", "the last mesh, with its n-gons; a solid with --depth"),
     ("gltf", "gltf", "an animation for viewers and engines; binary in a file .glb"),
     ("gif", "gif", "an animated picture"),
     ("png", "sheet", "every step on one sheet"),
     ("blender", "blender", "a Python script that builds the mesh with Blender's own operators"),
+    ("stl", "stl", "triangles in millimetres for slicers; --depth makes it solid"),
+    ("3mf", "threemf", "the same with units in it, for printers' programs"),
 )
 _MODULES = {name: module for name, module, _ in LISTED}
 _registered: dict[str, Format] = {}
+
+
+def check_size(size: float) -> float:
+    """The side of the unit square in a file. Raises ConfigError for one that is not above 0, or beyond a million."""
+    if not 0.0 < size <= MOST_SIZE:
+        raise ConfigError(f"size {size}: expected the side of the picture, above 0 and at most {MOST_SIZE:.0f}")
+    return float(size)
 
 
 def register_format(made: Format) -> None:

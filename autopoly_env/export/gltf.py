@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from autopoly_env.arrays import FloatArray
+from autopoly_env.arrays import FloatArray, IntArray
 from autopoly_env.errors import ConfigError
 from autopoly_env.export.formats import Format, register_format
 from autopoly_env.export.replay import finite_meshes, sequence_name, unmoved
@@ -31,7 +31,8 @@ def save_gltf(sequence: ConstructionSequence, path: str | os.PathLike[str], dept
 
     Each step is a node with the mesh after it, cut into triangles, x right, y up, z towards the viewer; `depth` (units
     of the unit square) makes it a closed solid behind z = 0. The one animation shows a step a second, by the nodes'
-    scale 0 or 1; the vertices' moves are a morph target. At rest the last step shows and the others have scale 0.
+    scale 0 or 1; the vertices' moves are a morph target. At rest the last step shows and the others have scale 0,
+    in the middle of the last mesh, which all places are relative to: so the box of the scene is that mesh's own.
 
     Raises ConfigError for another suffix or a depth below 0 or not finite, SequenceError naming a step that cannot be
     replayed, OutputError if the file cannot be written.
@@ -77,6 +78,7 @@ class _Buffer:
 def _document(sequence: ConstructionSequence, depth: float) -> tuple[dict[str, Any], bytes]:
     meshes = finite_meshes(sequence)
     buffer, last = _Buffer(), len(meshes) - 1
+    middle = _middle(to_solid(meshes[-1], depth))
     shapes: list[dict[str, Any]] = []
     nodes: list[dict[str, Any]] = []
     animation: dict[str, Any] = {"name": "construction", "channels": [], "samplers": []}
@@ -84,8 +86,9 @@ def _document(sequence: ConstructionSequence, depth: float) -> tuple[dict[str, A
         step = sequence.steps[number - 1] if number else None
         name = f"{number} {step.operator if step else 'start'}"
         solid = to_solid(mesh, depth)
-        shapes.append(_shape(buffer, name, solid))
-        nodes.append({"name": name, "mesh": number} | ({} if number == last else {"scale": [0.0, 0.0, 0.0]}))
+        shapes.append(_shape(buffer, name, solid.vertices - middle, to_triangles(solid)))
+        hidden = {} if number == last else {"scale": [0.0, 0.0, 0.0]}
+        nodes.append({"name": name, "mesh": number, "translation": middle.tolist()} | hidden)
         _animate(buffer, animation, number, "scale", "STEP", *_scales(number, last))
         offsets = (unmoved(step, meshes[number - 1], mesh) - mesh.vertices) * (1, -1) if step else np.zeros((1, 2))
         if step and offsets.any():
@@ -108,11 +111,17 @@ def _document(sequence: ConstructionSequence, depth: float) -> tuple[dict[str, A
     }, bytes(buffer.data)
 
 
-def _shape(buffer: _Buffer, name: str, solid: Solid) -> dict[str, Any]:
-    """The solid as a glTF mesh of triangles."""
+def _middle(solid: Solid) -> FloatArray:
+    """(3,) the middle of its box, in numbers that single precision has."""
+    middle = 0.5 * (solid.vertices.min(axis=0) + solid.vertices.max(axis=0))
+    return middle.astype(np.float32).astype(np.float64)
+
+
+def _shape(buffer: _Buffer, name: str, vertices: FloatArray, triangles: IntArray) -> dict[str, Any]:
+    """A glTF mesh of triangles."""
     primitive = {
-        "attributes": {"POSITION": buffer.add(solid.vertices, VERTICES)},
-        "indices": buffer.add(to_triangles(solid).ravel(), INDICES),
+        "attributes": {"POSITION": buffer.add(vertices, VERTICES)},
+        "indices": buffer.add(triangles.ravel(), INDICES),
         "material": 0,
     }
     return {"name": name, "primitives": [primitive]}

@@ -6,17 +6,20 @@ from pathlib import Path
 from autopoly_env.errors import MeshError
 from autopoly_env.export.formats import Export, Format, register_format
 from autopoly_env.export.solid import to_solid_obj
+from autopoly_env.export.triangles import is_concave, triangulate
 from autopoly_env.files import read_text, write_atomically
 from autopoly_env.mesh import PolyMesh
 
 MOST_BYTES = 16_000_000  # of a file
+WAY_OUT = "agents.export --to obj --triangles cuts them"
 
 
-def to_obj(mesh: PolyMesh) -> str:
+def to_obj(mesh: PolyMesh, *, triangles: bool = False) -> str:
     """The mesh as OBJ text: in the unit square at z = 0 with y up, floats with all their digits.
 
-    Faces keep their n corners and their first one. They run the other way round than in `mesh`, because turning y up
-    mirrors the picture: a face of positive area has positive area there too, and looks towards +z.
+    Faces keep their n corners and their first one, or are cut into triangles. They run the other way round than in
+    `mesh`, because turning y up mirrors the picture: a face of positive area has positive area there too, and looks
+    towards +z. Where n-gons are concave a line at the top says so: many readers take them for larger than they are.
 
     >>> print(to_obj(PolyMesh.rectangle(0.0, 0.0, 1.0, 0.5)), end="")
     # AutoPoly: 4 vertices, 4 edges, 1 face; unit square, y up
@@ -27,10 +30,21 @@ def to_obj(mesh: PolyMesh) -> str:
     f 1 4 3 2
     """
     n_vertices, n_edges, n_faces = mesh.counts
-    faces = f"{n_faces} face" + ("s" if n_faces != 1 else "")
-    lines = [f"# AutoPoly: {n_vertices} vertices, {n_edges} edges, {faces}; unit square, y up"]
-    lines += [f"v {x!r} {(1.0 - y)!r} 0" for x, y in mesh.vertices.tolist()]
-    for first, *others in mesh.faces:
+    told = f"{n_faces} face" + ("s" if n_faces != 1 else "")
+    lines = [f"# AutoPoly: {n_vertices} vertices, {n_edges} edges, {told}; unit square, y up"]
+    points, faces = mesh.vertices.tolist(), list(mesh.faces)
+    rings = [[points[v] for v in face] for face in faces]
+    if triangles:
+        faces = [
+            tuple(face[k] for k in cut)
+            for face, ring in zip(mesh.faces, rings, strict=True)
+            for cut in triangulate(ring)
+        ]
+        lines.append(f"# cut into {len(faces)} triangles")
+    elif n_concave := sum(map(is_concave, rings)):
+        lines.append(f"# {n_concave} of them concave, which some readers fan from a corner: {WAY_OUT}")
+    lines += [f"v {x!r} {(1.0 - y)!r} 0" for x, y in points]
+    for first, *others in faces:
         lines.append(" ".join(["f", *(str(v + 1) for v in (first, *reversed(others)))]))
     return "\n".join(lines) + "\n"
 
@@ -88,10 +102,19 @@ def _vertex(corner: str, n_vertices: int) -> int:
 
 
 def _write(export: Export, path: Path) -> Path:
-    mesh = export.sequence.final()
-    return write_atomically(path, to_solid_obj(mesh, export.depth) if export.depth else to_obj(mesh))
+    mesh, triangles = export.sequence.final(), export.triangles
+    if export.depth:
+        return write_atomically(path, to_solid_obj(mesh, export.depth, triangles=triangles))
+    return write_atomically(path, to_obj(mesh, triangles=triangles))
 
 
 register_format(
-    Format("obj", (".obj",), "the last mesh, with its n-gons; a solid of them with --depth", _write, shows_depth=True)
+    Format(
+        "obj",
+        (".obj",),
+        "the last mesh, with its n-gons; a solid with --depth",
+        _write,
+        shows_depth=True,
+        options=("triangles",),
+    )
 )

@@ -12,6 +12,7 @@ import pytest
 
 from autopoly_env.errors import ConfigError, SequenceError
 from autopoly_env.export.gltf import save_gltf
+from autopoly_env.export.solid import APART
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.sequence import ConstructionSequence
 from tests.helpers.sequences import SCORE, gabled, walked
@@ -55,16 +56,16 @@ def test_every_step__has_the_area_of_its_mesh(
     document, data = read_file(save_gltf(sequence, tmp_path / f"mesh{suffix}", depth))
     meshes = sequence.meshes()
     assert len(document["meshes"]) == len(meshes) and document["buffers"][0]["byteLength"] <= len(data)
-    for mesh, shape in zip(meshes, document["meshes"], strict=True):
+    for mesh, shape, node in zip(meshes, document["meshes"], document["nodes"], strict=False):
         (primitive,) = shape["primitives"]
-        points = values(document, data, primitive["attributes"]["POSITION"]).astype(np.float64)
+        points = values(document, data, primitive["attributes"]["POSITION"]) + np.array(node["translation"])
+        points = np.where(np.abs(points[:, 2:]) < 1e-6, points * (1, 1, 0), points)
         a, b, c = (points[corners] for corners in values(document, data, primitive["indices"]).reshape(-1, 3).T)
         towards_viewer = np.cross(b - a, c - a)[:, 2][(a[:, 2] == 0) & (b[:, 2] == 0) & (c[:, 2] == 0)]
         assert 0.5 * towards_viewer.sum() == pytest.approx(mesh.face_areas().sum(), abs=1e-6)
         assert set(np.unique(points[:, 2])) == {0.0, -depth}
-        assert {(x, y) for x, y, _ in points.tolist()} == {
-            (float(np.float32(x)), float(np.float32(1.0 - y))) for x, y in mesh.vertices.tolist()
-        }
+        gaps = points[:, None, :2] - (mesh.vertices * (1, -1) + (0, 1))
+        assert np.linalg.norm(gaps, axis=2).min(axis=1).max() < 2 * APART
 
 
 def test_house__shows_one_step_a_second(tmp_path: Path) -> None:
@@ -84,6 +85,7 @@ def test_house__shows_one_step_a_second(tmp_path: Path) -> None:
         3: [(0, 0), (3, 1), (4, 1)],
     }
     assert [node.get("scale") for node in document["nodes"]] == [[0, 0, 0]] * 3 + [None, None]
+    assert [node.get("translation") for node in document["nodes"]] == [[0.5625, 0.5625, 0]] * 4 + [None]
     assert [node["name"] for node in document["nodes"]][-2:] == ["3 edge_extrude", "house"]
 
 
@@ -114,6 +116,16 @@ def test_trimesh__reads_the_same_shapes(tmp_path: Path, suffix: str, depth: floa
             assert shape.area == pytest.approx((2 * area + depth * rim) if depth else area, rel=1e-4)
             if depth:
                 assert shape.is_watertight and shape.volume == pytest.approx(area * depth, rel=1e-4)
+
+
+@pytest.mark.parametrize("depth", [0.0, 0.25])
+def test_box_in_trimesh__is_that_of_the_last_mesh(tmp_path: Path, depth: float) -> None:
+    trimesh = pytest.importorskip("trimesh", reason="trimesh is not installed (pip install trimesh)")
+    for sequence in SEQUENCES:
+        scene = trimesh.load_scene(save_gltf(sequence, tmp_path / "mesh.glb", depth), process=False)
+        places = sequence.final().vertices * (1, -1) + (0, 1)
+        expected = [[*places.min(axis=0), -depth], [*places.max(axis=0), 0.0]]
+        np.testing.assert_allclose(scene.bounds, expected, atol=1e-5)
 
 
 def test_start_alone__is_a_still(tmp_path: Path) -> None:
