@@ -32,7 +32,8 @@ def save_gltf(sequence: ConstructionSequence, path: str | os.PathLike[str], dept
     Each step is a node with the mesh after it, cut into triangles, x right, y up, z towards the viewer; `depth` (units
     of the unit square) makes it a closed solid behind z = 0. The one animation shows a step a second, by the nodes'
     scale 0 or 1; the vertices' moves are a morph target. At rest the last step shows and the others have scale 0,
-    in the middle of the last mesh, which all places are relative to: so the box of the scene is that mesh's own.
+    in the middle of the last mesh, which all places are relative to: so the box of the scene is that mesh's own. As
+    viewers count morph targets in as well, the last mesh is there once more without, as `done`, where it has one.
 
     Raises ConfigError for another suffix or a depth below 0 or not finite, SequenceError naming a step that cannot be
     replayed, OutputError if the file cannot be written.
@@ -77,8 +78,9 @@ class _Buffer:
 
 def _document(sequence: ConstructionSequence, depth: float) -> tuple[dict[str, Any], bytes]:
     meshes = finite_meshes(sequence)
-    buffer, last = _Buffer(), len(meshes) - 1
+    buffer, end = _Buffer(), STEP_SECONDS * len(meshes)
     middle = _middle(to_solid(meshes[-1], depth))
+    times = [(STEP_SECONDS * number, STEP_SECONDS * (number + 1)) for number in range(len(meshes))]
     shapes: list[dict[str, Any]] = []
     nodes: list[dict[str, Any]] = []
     animation: dict[str, Any] = {"name": "construction", "channels": [], "samplers": []}
@@ -87,20 +89,28 @@ def _document(sequence: ConstructionSequence, depth: float) -> tuple[dict[str, A
         name = f"{number} {step.operator if step else 'start'}"
         solid = to_solid(mesh, depth)
         shapes.append(_shape(buffer, name, solid.vertices - middle, to_triangles(solid)))
-        hidden = {} if number == last else {"scale": [0.0, 0.0, 0.0]}
-        nodes.append({"name": name, "mesh": number, "translation": middle.tolist()} | hidden)
-        _animate(buffer, animation, number, "scale", "STEP", *_scales(number, last))
+        nodes.append({"name": name, "mesh": number, "translation": middle.tolist()})
         offsets = (unmoved(step, meshes[number - 1], mesh) - mesh.vertices) * (1, -1) if step else np.zeros((1, 2))
         if step and offsets.any():
             _add_morph(buffer, shapes[-1], np.pad(offsets, ((0, 0), (0, 1)))[list(solid.sources)])
             begin = STEP_SECONDS * number
             _animate(buffer, animation, number, "weights", "LINEAR", [begin, begin + MOVE_SECONDS], [1.0, 0.0])
-    nodes.append({"name": sequence_name(sequence), "children": list(range(len(meshes)))})
+    if "targets" in shapes[-1]["primitives"][0]:
+        plain = {name: value for name, value in shapes[-1]["primitives"][0].items() if name != "targets"}
+        shapes.append({"name": "done", "primitives": [plain]})
+        nodes.append({"name": "done", "mesh": len(meshes), "translation": middle.tolist()})
+        begin = times[-1][0] + MOVE_SECONDS
+        times[-1:] = [(times[-1][0], begin), (begin, end)]
+    for number, (node, (begin, gone)) in enumerate(zip(nodes, times, strict=True)):
+        if gone < end:
+            node["scale"] = [0.0, 0.0, 0.0]
+        _animate(buffer, animation, number, "scale", "STEP", *_scales(begin, gone, end))
+    nodes.append({"name": sequence_name(sequence), "children": list(range(len(nodes)))})
     material = {"pbrMetallicRoughness": {"baseColorFactor": COLOUR, "metallicFactor": 0.0, "roughnessFactor": 0.8}}
     return {
         "asset": {"version": "2.0", "generator": "AutoPoly"},
         "scene": 0,
-        "scenes": [{"name": sequence_name(sequence), "nodes": [len(meshes)]}],
+        "scenes": [{"name": sequence_name(sequence), "nodes": [len(nodes) - 1]}],
         "nodes": nodes,
         "meshes": shapes,
         "materials": [{"name": "AutoPoly", "doubleSided": True, **material}],
@@ -127,10 +137,9 @@ def _shape(buffer: _Buffer, name: str, vertices: FloatArray, triangles: IntArray
     return {"name": name, "primitives": [primitive]}
 
 
-def _scales(number: int, last: int) -> tuple[list[float], list[list[float]]]:
-    """When a step appears and goes, and its scale from then on; all steps have a key at 0, the last one at the end."""
-    begin, end = STEP_SECONDS * number, STEP_SECONDS * (number + 1)
-    keys = {0.0: float(number == 0), begin: 1.0, end: float(number == last)}
+def _scales(begin: float, gone: float, end: float) -> tuple[list[float], list[list[float]]]:
+    """When a node appears and goes, and its scale from then on; all have a key at 0, and one that stays at the end."""
+    keys = {0.0: float(begin == 0.0), begin: 1.0, gone: float(gone == end)}
     return list(keys), [[scale] * 3 for scale in keys.values()]
 
 

@@ -1,0 +1,53 @@
+"""What Blender makes of files, as `readers.py` tells it: `blender -b --python in_blender.py -- ANSWER FILE...`."""
+
+import json
+import sys
+from pathlib import Path
+
+import bpy
+
+SVG_UNIT = 0.0254 / 90.0  # metres a user unit, as its importer takes them
+
+
+def read(path: str) -> dict[str, object]:
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    ending = Path(path).suffix
+    if ending == ".obj":
+        bpy.ops.wm.obj_import(filepath=path, forward_axis="Y", up_axis="Z")
+    elif ending == ".stl":
+        bpy.ops.import_mesh.stl(filepath=path)
+    elif ending == ".glb":
+        bpy.ops.import_scene.gltf(filepath=path, import_shading="FLAT")
+        bpy.context.scene.frame_set(round(max(action.frame_range[1] for action in bpy.data.actions)))
+    elif ending == ".svg":
+        bpy.ops.import_curve.svg(filepath=path)
+    else:
+        bpy.ops.wm.usd_import(filepath=path)
+    area = volume = 0.0
+    scale = SVG_UNIT**2 if ending == ".svg" else 1.0
+    graph = bpy.context.evaluated_depsgraph_get()
+    for thing in bpy.context.scene.objects:
+        if thing.type not in ("MESH", "CURVE") or (ending == ".svg" and "face-" not in thing.name):
+            continue
+        shape = thing.to_mesh() if thing.type == "MESH" else thing.evaluated_get(graph).to_mesh()
+        shape.transform(thing.matrix_world)
+        area += sum(polygon.area for polygon in shape.polygons)
+        shape.calc_loop_triangles()
+        for triangle in shape.loop_triangles:
+            a, b, c = (shape.vertices[k].co for k in triangle.vertices)
+            volume += a.dot(b.cross(c)) / 6.0
+    return {"area": area / scale, "volume": volume}
+
+
+def main(answer: str, paths: list[str]) -> None:
+    found = []
+    for path in paths:
+        try:
+            found.append(read(path))
+        except Exception as error:
+            found.append({"error": str(error).strip().splitlines()[-1][:200]})
+    Path(answer).write_text(json.dumps({"version": bpy.app.version_string, "found": found}))
+
+
+at = sys.argv.index("--")
+main(sys.argv[at + 1], sys.argv[at + 2 :])
