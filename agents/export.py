@@ -17,6 +17,7 @@ from autopoly_env.outside import described
 from autopoly_env.shown import tame
 
 if TYPE_CHECKING:
+    from autopoly_env.export.texture import Texture
     from autopoly_env.sequence import ConstructionSequence
 
 DEFAULT = "html"
@@ -82,11 +83,16 @@ def export(
     size: Annotated[
         float | None,
         typer.Option(
-            metavar="MM", help="Side of the picture, in millimetres, in formats for machines.", show_default="100"
+            help="Side of the picture: millimetres (stl, 3mf, dxf; 100) or pixels (png, godot, convex-json; 512).",
+            show_default="the format's own",
         ),
     ] = None,
     triangles: Annotated[bool, typer.Option("--triangles", help="Cut faces into triangles (obj).")] = False,
     layers: Annotated[bool, typer.Option("--layers", help="All steps, a layer each (svg).")] = False,
+    texture: Annotated[
+        Path | None,
+        typer.Option(metavar="IMAGE", help="The picture on the mesh (obj, gltf).", show_default="none"),
+    ] = None,
     operators: OutsideOperators = None,
     object_: pictures.Object = "auto",
     background: pictures.Background = None,
@@ -107,15 +113,18 @@ def export(
     if target is None and (show_mask or pictures.as_dict(picture)):
         raise ConfigError("--object, --show-mask and the like are about the picture of --target; give one")
     made = _choose(to, out, len(sources))
-    _refuse_what_is_not_shown(made, depth=depth, target=target, size=size, triangles=triangles, layers=layers)
+    _refuse_what_is_not_shown(
+        made, depth=depth, target=target, size=size, triangles=triangles, layers=layers, texture=texture
+    )
     jobs = list(_name_outputs(sources, out, made.suffix))
     silhouette = load_silhouette(target, options=picture) if target else None
     if silhouette is not None and show_mask:
         print(pictures.save_mask(silhouette, jobs[0][1].with_name(f"{silhouette.name}-{pictures.MASK}")))
+    shown = _load_texture(texture) if texture else None
     n_failed = 0
     for source, goal in jobs:
         try:
-            _write(made, Export(_load(source, step), silhouette, depth, size, triangles, layers), goal)
+            _write(made, Export(_load(source, step), silhouette, depth, size, triangles, layers, shown), goal)
             print(tame(str(goal)))
         except ConfigError:
             raise
@@ -136,12 +145,14 @@ def _choose(to: str | None, out: Path | None, n: int) -> Format:
     if out is None or not out.suffix or os.path.isdir(out):
         return named or find_format(DEFAULT)
     if n > 1:  # to go into a folder, which may have a dot in its name
-        if out.suffix.lower() in {suffix for other in formats().values() for suffix in other.suffixes}:
+        if out.suffix.lower() in {
+            Path(f"_{suffix}").suffix for other in formats().values() for suffix in other.suffixes
+        }:
             raise ConfigError(f"--out {out}: one file for {n} sequences; give a folder")
         return named or find_format(DEFAULT)
     if named is None:
         return format_of(out)
-    if out.suffix.lower() not in named.suffixes:
+    if out.suffix.lower() not in {Path(f"_{suffix}").suffix for suffix in named.suffixes}:
         endings = " or ".join(named.suffixes)
         raise ConfigError(f"--out {out} with --to {to}: expected a file name that ends in {endings}; leave one out")
     return named
@@ -173,6 +184,13 @@ def _write(made: Format, export: Export, goal: Path) -> None:
         raise OutputError(f"{who}, failed: {what}; expected a file or an OutputError ({_CHECK})") from error
     if not os.path.exists(goal):
         raise OutputError(f"{who}, made no such file ({_CHECK})")
+
+
+def _load_texture(path: Path) -> "Texture":
+    """The picture in a file. Raises SilhouetteError."""
+    from autopoly_env.export.texture import load_texture
+
+    return load_texture(path)
 
 
 def _load(path: Path, step: int | None) -> "ConstructionSequence":

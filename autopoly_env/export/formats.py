@@ -13,6 +13,7 @@ from autopoly_env import outside
 from autopoly_env.errors import ConfigError
 
 if TYPE_CHECKING:
+    from autopoly_env.export.texture import Texture
     from autopoly_env.sequence import ConstructionSequence
     from autopoly_env.silhouette import Silhouette
 
@@ -27,6 +28,7 @@ class Export:
     size: float | None = None  # side of the unit square, in millimetres or pixels; None: the format's own
     triangles: bool = False  # no other faces
     layers: bool = False  # all steps, each in a layer, where otherwise the last mesh is shown
+    texture: "Texture | None" = None  # the picture on the mesh
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,7 @@ class Format:
     """
 
     name: str
-    suffixes: tuple[str, ...]  # such as .obj; files get the first, unless they have another
+    suffixes: tuple[str, ...]  # such as .obj or .mesh.png; files get the first, unless they have another
     help: str  # a line
     write: Callable[[Export, Path], object]
     shows_target: bool = False
@@ -74,6 +76,12 @@ LISTED = (
     ("blender", "blender", "a Python script that builds the mesh with Blender's own operators"),
     ("stl", "stl", "triangles in millimetres for slicers; --depth makes it solid"),
     ("3mf", "threemf", "the same with units in it, for printers' programs"),
+    ("usd", "usd", "the last mesh in quads and triangles (extra usd)"),
+    ("dxf", "dxf", "the outlines in millimetres, for cutters (extra dxf)"),
+    ("godot", "godot", "a scene of Godot 4: Polygon2D and convex collision shapes"),
+    ("convex-json", "convex", "convex pieces for physics engines, as a map of Tiled"),
+    ("mesh-png", "cutout", "the last mesh on a transparent background"),
+    ("mask-png", "cutout", "what the last mesh covers, white on black"),
 )
 _MODULES = {name: module for name, module, _ in LISTED}
 _registered: dict[str, Format] = {}
@@ -118,6 +126,7 @@ def find_format(name: str) -> Format:
 def format_of(path: Path) -> Format:
     """The format that a file's ending stands for. Raises ConfigError where it stands for none."""
     known = {suffix: made for made in formats().values() for suffix in made.suffixes}
-    if path.suffix.lower() not in known:
-        raise ConfigError(f"{path}: no format has the ending {path.suffix or 'of nothing'}; give {', '.join(known)}")
-    return known[path.suffix.lower()]
+    for suffix in sorted(known, key=len, reverse=True):  # .mesh.png before .png
+        if path.name.lower().endswith(suffix):
+            return known[suffix]
+    raise ConfigError(f"{path}: no format has the ending {path.suffix or 'of nothing'}; give {', '.join(known)}")

@@ -15,6 +15,7 @@ from autopoly_env.errors import ConfigError
 from autopoly_env.export.formats import Format, register_format
 from autopoly_env.export.replay import finite_meshes, sequence_name, unmoved
 from autopoly_env.export.solid import Solid, to_solid, to_triangles
+from autopoly_env.export.texture import Texture
 from autopoly_env.files import write_atomically
 from autopoly_env.sequence import ConstructionSequence
 
@@ -24,16 +25,23 @@ SUFFIXES = (".gltf", ".glb")  # text and binary
 COLOUR = (0.32, 0.47, 0.76, 1.0)  # linear RGBA
 FLOAT, UINT = 5126, 5125  # component types
 VERTICES, INDICES = 34962, 34963  # what a buffer view is for
+CLAMP = 33071  # a texture's rim goes on beyond it
 
 
-def save_gltf(sequence: ConstructionSequence, path: str | os.PathLike[str], depth: float = 0.0) -> Path:
+def save_gltf(
+    sequence: ConstructionSequence,
+    path: str | os.PathLike[str],
+    depth: float = 0.0,
+    texture: Texture | None = None,
+) -> Path:
     """Write a sequence as glTF: text with all data in it for the suffix .gltf, binary for .glb.
 
     Each step is a node with the mesh after it, cut into triangles, x right, y up, z towards the viewer; `depth` (units
     of the unit square) makes it a closed solid behind z = 0. The one animation shows a step a second, by the nodes'
     scale 0 or 1; the vertices' moves are a morph target. At rest the last step shows and the others have scale 0,
     in the middle of the last mesh, which all places are relative to: so the box of the scene is that mesh's own. As
-    viewers count morph targets in as well, the last mesh is there once more without, as `done`, where it has one.
+    viewers count morph targets in as well, the last mesh is there once more without, as `done`, where it has one. A
+    `texture` is part of the file; what is clear in it is cut out.
 
     Raises ConfigError for another suffix or a depth below 0 or not finite, SequenceError naming a step that cannot be
     replayed, OutputError if the file cannot be written.
@@ -41,7 +49,7 @@ def save_gltf(sequence: ConstructionSequence, path: str | os.PathLike[str], dept
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:
         raise ConfigError(f"{path}: expected a file name that ends in .gltf (text) or .glb (binary)")
-    document, data = _document(sequence, depth)
+    document, data = _document(sequence, depth, texture)
     if suffix == ".glb":
         return write_atomically(path, _binary(document, data))
     document["buffers"][0]["uri"] = "data:application/octet-stream;base64," + base64.b64encode(data).decode("ascii")
@@ -56,8 +64,14 @@ class _Buffer:
         self.views: list[dict[str, Any]] = []
         self.accessors: list[dict[str, Any]] = []
 
+    def add_bytes(self, data: bytes) -> int:
+        """Append what is no numbers, filled up to whole words; gives the view's index."""
+        self.views.append({"buffer": 0, "byteOffset": len(self.data), "byteLength": len(data)})
+        self.data += data + b"\0" * (-len(data) % 4)
+        return len(self.views) - 1
+
     def add(self, values: npt.ArrayLike, use: int | None = None) -> int:
-        """Append scalars (n,) or vectors (n, 3), as floats or, for INDICES, as integers; gives the accessor's index."""
+        """Append scalars (n,) or vectors (n, 2 or 3), floats or, for INDICES, integers; gives the accessor's index."""
         array = np.asarray(values, np.uint32 if use == INDICES else np.float32)
         view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": array.nbytes}
         self.views.append(view | ({"target": use} if use else {}))
@@ -68,7 +82,7 @@ class _Buffer:
                 "bufferView": len(self.views) - 1,
                 "componentType": UINT if use == INDICES else FLOAT,
                 "count": len(array),
-                "type": "SCALAR" if array.ndim == 1 else "VEC3",
+                "type": "SCALAR" if array.ndim == 1 else f"VEC{array.shape[1]}",
                 "min": rows.min(axis=0).tolist(),
                 "max": rows.max(axis=0).tolist(),
             }
@@ -76,7 +90,7 @@ class _Buffer:
         return len(self.accessors) - 1
 
 
-def _document(sequence: ConstructionSequence, depth: float) -> tuple[dict[str, Any], bytes]:
+def _document(sequence: ConstructionSequence, depth: float, texture: Texture | None) -> tuple[dict[str, Any], bytes]:
     meshes = finite_meshes(sequence)
     buffer, end = _Buffer(), STEP_SECONDS * len(meshes)
     middle = _middle(to_solid(meshes[-1], depth))
@@ -89,6 +103,9 @@ def _document(sequence: ConstructionSequence, depth: float) -> tuple[dict[str, A
         name = f"{number} {step.operator if step else 'start'}"
         solid = to_solid(mesh, depth)
         shapes.append(_shape(buffer, name, solid.vertices - middle, to_triangles(solid)))
+        if texture:
+            places = buffer.add(texture.places(mesh.vertices)[list(solid.sources)], VERTICES)
+            shapes[-1]["primitives"][0]["attributes"]["TEXCOORD_0"] = places
         nodes.append({"name": name, "mesh": number, "translation": middle.tolist()})
         offsets = (unmoved(step, meshes[number - 1], mesh) - mesh.vertices) * (1, -1) if step else np.zeros((1, 2))
         if step and offsets.any():
@@ -106,19 +123,34 @@ def _document(sequence: ConstructionSequence, depth: float) -> tuple[dict[str, A
             node["scale"] = [0.0, 0.0, 0.0]
         _animate(buffer, animation, number, "scale", "STEP", *_scales(begin, gone, end))
     nodes.append({"name": sequence_name(sequence), "children": list(range(len(nodes)))})
-    material = {"pbrMetallicRoughness": {"baseColorFactor": COLOUR, "metallicFactor": 0.0, "roughnessFactor": 0.8}}
+    look = _textured(buffer, texture) if texture else _look({"baseColorFactor": COLOUR})
     return {
         "asset": {"version": "2.0", "generator": "AutoPoly"},
         "scene": 0,
         "scenes": [{"name": sequence_name(sequence), "nodes": [len(nodes) - 1]}],
         "nodes": nodes,
         "meshes": shapes,
-        "materials": [{"name": "AutoPoly", "doubleSided": True, **material}],
+        **look,
         "animations": [animation],
         "accessors": buffer.accessors,
         "bufferViews": buffer.views,
         "buffers": [{"byteLength": len(buffer.data)}],
     }, bytes(buffer.data)
+
+
+def _look(base: dict[str, Any], more: dict[str, Any] | None = None) -> dict[str, Any]:
+    """The one material."""
+    roughness = {"pbrMetallicRoughness": base | {"metallicFactor": 0.0, "roughnessFactor": 0.8}}
+    return {"materials": [{"name": "AutoPoly", "doubleSided": True, **roughness, **(more or {})}]}
+
+
+def _textured(buffer: _Buffer, texture: Texture) -> dict[str, Any]:
+    """The material with the picture, and where in the file that is."""
+    more = {"alphaMode": "MASK", "alphaCutoff": 0.5} if texture.has_alpha else {}
+    image = {"name": "picture", "bufferView": buffer.add_bytes(texture.png), "mimeType": "image/png"}
+    sampler = {"wrapS": CLAMP, "wrapT": CLAMP}
+    maps = {"images": [image], "samplers": [sampler], "textures": [{"source": 0, "sampler": 0}]}
+    return maps | _look({"baseColorTexture": {"index": 0}}, more)
 
 
 def _middle(solid: Solid) -> FloatArray:
@@ -177,7 +209,8 @@ register_format(
         "gltf",
         SUFFIXES,
         "an animation for viewers and engines; binary in a file .glb",
-        lambda export, path: save_gltf(export.sequence, path, export.depth),
+        lambda export, path: save_gltf(export.sequence, path, export.depth, export.texture),
         shows_depth=True,
+        options=("texture",),
     )
 )

@@ -5,10 +5,11 @@ from pathlib import Path
 
 from autopoly_env.errors import MeshError
 from autopoly_env.export.formats import Export, Format, register_format
-from autopoly_env.export.solid import to_solid_obj
+from autopoly_env.export.solid import face_lines, solid_lines, to_solid_obj
+from autopoly_env.export.texture import Texture
 from autopoly_env.export.triangles import is_concave, triangulate
 from autopoly_env.files import read_text, write_atomically
-from autopoly_env.mesh import PolyMesh
+from autopoly_env.mesh import Face, PolyMesh
 
 MOST_BYTES = 16_000_000  # of a file
 WAY_OUT = "agents.export --to obj --triangles cuts them"
@@ -29,24 +30,50 @@ def to_obj(mesh: PolyMesh, *, triangles: bool = False) -> str:
     v 0.0 0.5 0
     f 1 4 3 2
     """
+    head, vertices, faces = _flat_lines(mesh, triangles)
+    return "\n".join([*head, *vertices, *face_lines(faces)]) + "\n"
+
+
+def _flat_lines(mesh: PolyMesh, triangles: bool) -> tuple[list[str], list[str], list[Face]]:
+    """Comments, `v` lines and faces of a flat mesh, y up."""
     n_vertices, n_edges, n_faces = mesh.counts
     told = f"{n_faces} face" + ("s" if n_faces != 1 else "")
-    lines = [f"# AutoPoly: {n_vertices} vertices, {n_edges} edges, {told}; unit square, y up"]
+    head = [f"# AutoPoly: {n_vertices} vertices, {n_edges} edges, {told}; unit square, y up"]
     points, faces = mesh.vertices.tolist(), list(mesh.faces)
     rings = [[points[v] for v in face] for face in faces]
     if triangles:
-        faces = [
-            tuple(face[k] for k in cut)
-            for face, ring in zip(mesh.faces, rings, strict=True)
-            for cut in triangulate(ring)
-        ]
-        lines.append(f"# cut into {len(faces)} triangles")
+        pairs = zip(mesh.faces, rings, strict=True)
+        faces = [tuple(face[k] for k in cut) for face, ring in pairs for cut in triangulate(ring)]
+        head.append(f"# cut into {len(faces)} triangles")
     elif n_concave := sum(map(is_concave, rings)):
-        lines.append(f"# {n_concave} of them concave, which some readers fan from a corner: {WAY_OUT}")
-    lines += [f"v {x!r} {(1.0 - y)!r} 0" for x, y in points]
-    for first, *others in faces:
-        lines.append(" ".join(["f", *(str(v + 1) for v in (first, *reversed(others)))]))
-    return "\n".join(lines) + "\n"
+        head.append(f"# {n_concave} of them concave, which some readers fan from a corner: {WAY_OUT}")
+    vertices = [f"v {x!r} {(1.0 - y)!r} 0" for x, y in points]
+    return head, vertices, [(first, *reversed(others)) for first, *others in faces]
+
+
+def save_textured_obj(
+    mesh: PolyMesh, path: str | os.PathLike[str], texture: Texture, depth: float = 0.0, *, triangles: bool = False
+) -> Path:
+    """Write the mesh, or its solid, as OBJ with the picture on it: beside it NAME.mtl and NAME.texture.png.
+
+    Each vertex has its place in the picture (`vt`, v up). Raises OutputError if a file cannot be written.
+    """
+    path = Path(path)
+    stem = "".join(sign if sign.isprintable() and not sign.isspace() else "_" for sign in path.stem) or "mesh"
+    picture, material = path.with_name(f"{stem}.texture.png"), path.with_name(f"{stem}.mtl")
+    if depth:
+        head, vertices, faces, sources = solid_lines(mesh, depth, triangles)
+        places = texture.places(mesh.vertices)[list(sources)]
+    else:
+        head, vertices, faces = _flat_lines(mesh, triangles)
+        places = texture.places(mesh.vertices)
+    uses = [f"mtllib {material.name}", "usemtl picture"]
+    mapped = [f"vt {u!r} {(1.0 - v)!r}" for u, v in places.tolist()]
+    lines = [*head, *uses, *vertices, *mapped, *face_lines(faces, is_mapped=True)]
+    write_atomically(picture, texture.png)
+    cut = f"map_d {picture.name}\n" if texture.has_alpha else ""
+    write_atomically(material, f"newmtl picture\nKd 1 1 1\nillum 1\nmap_Kd {picture.name}\n{cut}")
+    return write_atomically(path, "\n".join(lines) + "\n")
 
 
 def from_obj(text: str) -> PolyMesh:
@@ -102,10 +129,11 @@ def _vertex(corner: str, n_vertices: int) -> int:
 
 
 def _write(export: Export, path: Path) -> Path:
-    mesh, triangles = export.sequence.final(), export.triangles
-    if export.depth:
-        return write_atomically(path, to_solid_obj(mesh, export.depth, triangles=triangles))
-    return write_atomically(path, to_obj(mesh, triangles=triangles))
+    mesh, depth, triangles = export.sequence.final(), export.depth, export.triangles
+    if export.texture:
+        return save_textured_obj(mesh, path, export.texture, depth, triangles=triangles)
+    text = to_solid_obj(mesh, depth, triangles=triangles) if depth else to_obj(mesh, triangles=triangles)
+    return write_atomically(path, text)
 
 
 register_format(
@@ -115,6 +143,6 @@ register_format(
         "the last mesh, with its n-gons; a solid with --depth",
         _write,
         shows_depth=True,
-        options=("triangles",),
+        options=("triangles", "texture"),
     )
 )

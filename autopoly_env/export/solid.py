@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,12 +59,24 @@ def to_solid_obj(mesh: PolyMesh, depth: float, *, triangles: bool = False) -> st
 
     Slicers know no other faces. Raises ConfigError as `to_solid` does.
     """
+    head, vertices, faces, _ = solid_lines(mesh, depth, triangles)
+    return "\n".join([*head, *vertices, *face_lines(faces)]) + "\n"
+
+
+def solid_lines(
+    mesh: PolyMesh, depth: float, triangles: bool
+) -> tuple[list[str], list[str], list[Face], tuple[int, ...]]:
+    """Comments, `v` lines and faces of a solid in OBJ, and the mesh vertex that each vertex came from."""
     solid = to_solid(mesh, depth)
-    faces = [tuple(face) for face in to_triangles(solid).tolist()] if triangles else _quads_and_triangles(solid)
-    lines = [f"# AutoPoly: solid of depth {float(depth)!r}, {len(solid.vertices)} vertices, {len(faces)} faces"]
-    lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in solid.vertices.tolist()]
-    lines += [" ".join(["f", *(str(v + 1) for v in face)]) for face in faces]
-    return "\n".join(lines) + "\n"
+    faces = [tuple(face) for face in to_triangles(solid).tolist()] if triangles else quads_and_triangles(solid)
+    told = f"# AutoPoly: solid of depth {float(depth)!r}, {len(solid.vertices)} vertices, {len(faces)} faces"
+    return [told], [f"v {x!r} {y!r} {z!r}" for x, y, z in solid.vertices.tolist()], faces, solid.sources
+
+
+def face_lines(faces: Sequence[Face], *, is_mapped: bool = False) -> list[str]:
+    """The `f` lines of OBJ; mapped faces have the `vt` of the same number at each corner."""
+    corner = "{0}/{0}" if is_mapped else "{0}"
+    return [" ".join(["f", *(corner.format(v + 1) for v in face)]) for face in faces]
 
 
 def to_triangles(solid: Solid) -> IntArray:
@@ -78,8 +91,8 @@ def _cuts(solid: Solid, face: Face) -> list[Triangle]:
     return [(0, 1, 2), (0, 2, 3)] if is_wall else triangulate(ring[:, :2].tolist())
 
 
-def _quads_and_triangles(solid: Solid) -> list[Face]:
-    """The faces, cut where they have more than four corners or are concave."""
+def quads_and_triangles(solid: Solid) -> list[Face]:
+    """The faces of a solid, cut into triangles where they have more than four corners or are concave."""
     faces: list[Face] = []
     for face in solid.faces:
         ring = solid.vertices[list(face)]

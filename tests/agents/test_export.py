@@ -71,7 +71,7 @@ def test_every_format__is_written_beside_the_sequence_and_named(run: Run, name: 
     assert (done.code, done.err) == (0, "")
     (written,) = set(os.listdir("work")) - {"house.json"}
     assert done.out.split() == [f"work/{written}"]
-    assert Path(written).stem == "house" and Path("work", written).stat().st_size > 300
+    assert written == f"house{FORMATS[name].suffix}" and Path("work", written).stat().st_size > 300
 
 
 def test_html__is_the_default_and_shows_the_target(run: Run) -> None:
@@ -188,6 +188,39 @@ def test_depth_and_size__reach_the_formats_for_printers(run: Run, name: str) -> 
     assert len({Path(f"{k}.{name}").read_bytes() for k in range(3)}) == 3
 
 
+def test_texture__is_put_on_obj_and_gltf(run: Run) -> None:
+    saved("work/house.json")
+    assert run("work/house.json", "--to", "obj", "--texture", target_image()).code == 0
+    assert sorted(os.listdir("work")) == ["house.json", "house.mtl", "house.obj", "house.texture.png"]
+    assert run("work/house.json", "--out", "house.gltf", "--texture", "target.png", "--depth", 0.1).code == 0
+    assert "TEXCOORD_0" in Path("house.gltf").read_text()
+    done = run("work/house.json", "--to", "obj", "--texture", "none.png")
+    assert (done.code, done.out, len(done.err.splitlines())) == (1, "", 1) and "none.png" in done.err
+
+
+def test_endings_of_two_parts__go_before_those_of_one(run: Run) -> None:
+    for name in ("a.mesh.png", "a.mask.png", "a.png"):
+        assert run(saved(), "--out", name).code == 0
+    assert run("house.json", "--to", "mask-png", "--out", "plain.png").code == 0
+    modes = {name: Image.open(name).mode for name in ("a.mesh.png", "a.mask.png", "a.png", "plain.png")}
+    assert modes == {"a.mesh.png": "RGBA", "a.mask.png": "L", "a.png": "RGB", "plain.png": "L"}
+    assert run("house.json", "--to", "convex-json").code == 0 and Path("house.convex.json").exists()
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_name_of_markup__is_written_by_every_format(run: Run, name: str) -> None:
+    odd = '</script><b>"\'"\\ & ]]> {{x}} %s\n[node]\x00'
+    done = run(saved("odd.json", house(settings={"target": odd})), "--to", name, "--out", "odd/")
+    assert (done.code, done.err) == (0, "")
+    (written,) = Path("odd").iterdir()
+    if written.suffix in (".svg", ".gltf", ".json", ".py", ".tscn", ".usda"):
+        text = written.read_text(encoding="utf-8")
+        assert "\n[node]" not in text and "\x00" not in text
+        {".svg": ET.fromstring, ".gltf": json.loads, ".json": json.loads, ".py": ast.parse}.get(written.suffix, str)(
+            text
+        )
+
+
 def test_solid_that_is_none__is_one_line_and_exit_code_1(run: Run) -> None:
     start = house().meshes()[0]
     flipped = ConstructionSequence({}, start.with_vertices(start.vertices[[1, 0, 3, 2]]), score(50.0))
@@ -280,7 +313,7 @@ def test_missing_file__does_not_keep_the_others_from_being_written(run: Run) -> 
         ([], "Missing argument"),
         (
             ["house.json", "--to", "fbx"],
-            "unknown format 'fbx'; give one of html, svg, obj, gltf, gif, png, blender, stl, 3mf",
+            "unknown format 'fbx'; give one of html, svg, obj, gltf, gif, png, blender, stl, 3mf, usd, dxf, godot, ",
         ),
         (["house.json", "--to", "svg", "--depth", "1"], "--depth 1.0: svg is flat; use it with obj, gltf, blender"),
         (["house.json", "--to", "obj", "--depth", "-1"], "depth -1.0"),
@@ -290,6 +323,10 @@ def test_missing_file__does_not_keep_the_others_from_being_written(run: Run) -> 
         (["house.json", "--to", "3mf", "--size", "-5"], "size -5.0: expected the side of the picture, above 0"),
         (["house.json", "--to", "3mf", "--size", "nan"], "size nan: expected"),
         (["house.json", "--to", "obj", "--size", "5"], "--size 5.0: obj has a size of its own; use it with stl, 3mf"),
+        (["house.json", "--to", "mask-png", "--size", "0"], "size 0.0: expected a whole number of pixels"),
+        (["house.json", "--to", "godot", "--size", "-1"], "size -1.0: expected the side of the picture"),
+        (["house.json", "--to", "stl", "--texture", "t.png"], "--texture t.png: stl has nothing of the kind; use it"),
+        (["house.json", "--to", "mesh-png", "--out", "a.gif"], "expected a file name that ends in .mesh.png"),
         (["house.json", "--to", "svg", "--triangles"], "--triangles: svg has nothing of the kind; use it with obj"),
         (["house.json", "--to", "obj", "--layers"], "--layers: obj has nothing of the kind; use it with svg"),
         (["house.json", "--to", "gltf", "--depth", "nan"], "depth nan"),
