@@ -20,7 +20,7 @@ from benchmarks.formats.programs import READERS, Asking, Found, ask_node
 
 TOLERANCE = 1e-5
 BOXED = ("trimesh", "three", "babylon", "open3d", "pyvista")  # that tell the box of a glTF scene
-WRONG = "**wrong**"
+RIGHT, WRONG = "right", "**wrong**"
 
 Files = dict[str, list[Path]]  # of each variant, one for each example
 
@@ -60,11 +60,18 @@ def _rows(asking: Asking, files: Files, sequences: list[ConstructionSequence]) -
             print(f"{title} is not installed", file=sys.stderr)
             continue
         version, found = answer
+        right: list[str] = []  # variants, a row for all of them
         of = {kind: found[k * len(NAMES) : (k + 1) * len(NAMES)] for k, kind in enumerate(asked)}
         for kind in kinds:
             ratios = {at: _ratios(of[at], at, sequences) for at in (kind, VARIANTS[kind].way_out) if at}
             cells = [_cell(kind, {at: values[k] for at, values in ratios.items()}) for k in range(len(NAMES))]
-            lines.append(f"| {title} {version} | `{VARIANTS[kind].options}` | {' | '.join(cells)} |")
+            options = f"`{VARIANTS[kind].options}`"
+            if set(cells) == {RIGHT}:
+                right.append(options)
+            else:
+                lines.append(f"| {title} {version} | {options} | {' | '.join(cells)} |")
+        if right:
+            lines.append(f"| {title} {version} | {', '.join(right)} | {' | '.join([RIGHT] * len(NAMES))} |")
     return lines
 
 
@@ -78,7 +85,7 @@ def _ratios(found: list[Found], kind: str, sequences: list[ConstructionSequence]
 def _cell(kind: str, ratios: dict[str, float]) -> str:
     """Right, or how many times too much, with what helps."""
     if _is_right(ratios[kind]):
-        return "right"
+        return RIGHT
     shown = "nothing" if np.isnan(ratios[kind]) or not ratios[kind] else f"×{ratios[kind]:.3g}"
     variant = VARIANTS[kind]
     helps = variant.way_out and _is_right(ratios[variant.way_out])

@@ -45,6 +45,10 @@ VARIANTS = {
     "svg-layers": Variant(
         "--to svg --layers", "svg", ".svg", side=DRAWN, is_all=True, way_out="svg", advice="no --layers"
     ),
+    "usd": Variant("--to usd --depth", "usd", ".usdc", DEPTH),
+    "dxf": Variant("--to dxf", "dxf", ".dxf", side=SIZE),
+    "godot": Variant("--to godot", "godot", ".tscn", side=DRAWN),
+    "tiled": Variant("--to convex-json", "convex-json", ".convex.json", side=DRAWN),
 }
 
 

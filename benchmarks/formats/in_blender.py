@@ -3,6 +3,7 @@
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import bpy
 
@@ -21,22 +22,26 @@ def read(path: str) -> dict[str, object]:
         bpy.context.scene.frame_set(round(max(action.frame_range[1] for action in bpy.data.actions)))
     elif ending == ".svg":
         bpy.ops.import_curve.svg(filepath=path)
-    else:
-        bpy.ops.wm.usd_import(filepath=path)
     area = volume = 0.0
-    scale = SVG_UNIT**2 if ending == ".svg" else 1.0
-    graph = bpy.context.evaluated_depsgraph_get()
     for thing in bpy.context.scene.objects:
-        if thing.type not in ("MESH", "CURVE") or (ending == ".svg" and "face-" not in thing.name):
+        if thing.type == "CURVE" and "face-" in thing.name:
+            area += sum(inside(spline, thing.matrix_world) for spline in thing.data.splines) / SVG_UNIT**2
+        if thing.type != "MESH":
             continue
-        shape = thing.to_mesh() if thing.type == "MESH" else thing.evaluated_get(graph).to_mesh()
+        shape = thing.to_mesh()
         shape.transform(thing.matrix_world)
         area += sum(polygon.area for polygon in shape.polygons)
         shape.calc_loop_triangles()
         for triangle in shape.loop_triangles:
             a, b, c = (shape.vertices[k].co for k in triangle.vertices)
             volume += a.dot(b.cross(c)) / 6.0
-    return {"area": area / scale, "volume": volume}
+    return {"area": area, "volume": volume}
+
+
+def inside(spline: Any, to_world: Any) -> float:
+    """The area in a curve of straight lines."""
+    ring = [to_world @ point.co for point in spline.bezier_points]
+    return 0.5 * abs(sum(a.x * b.y - b.x * a.y for a, b in zip(ring, ring[1:] + ring[:1], strict=True)))
 
 
 def main(answer: str, paths: list[str]) -> None:

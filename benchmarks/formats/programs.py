@@ -109,13 +109,17 @@ READERS: tuple[tuple[str, str, Ask, tuple[str, ...]], ...] = (
     ("pymeshlab", "PyMeshLab", ask_python, ("obj", "solid", "gltf", "stl", "3mf")),
     ("igl", "libigl", ask_python, ("obj", "solid", "stl")),
     ("meshio", "meshio", ask_python, ("obj", "solid", "stl")),
-    ("manifold3d", "manifold3d, through trimesh", ask_python, ("solid", "stl", "3mf")),
+    ("manifold3d", "manifold3d", ask_python, ("solid", "stl", "3mf")),
     ("assimp", "assimp", ask_assimp, ("obj", "solid", "gltf", "stl", "3mf")),
     ("blender", "Blender", ask_blender, ("obj", "solid", "gltf", "stl", "svg", "svg-layers")),
     ("admesh", "admesh", ask_admesh, ("stl",)),
     ("prusa", "PrusaSlicer", ask_prusa, ("solid", "stl", "3mf")),
     ("svgelements", "svgelements", ask_python, ("svg", "svg-layers")),
     ("svgpathtools", "svgpathtools", ask_python, ("svg", "svg-layers")),
+    ("usd", "OpenUSD, usd-core", ask_python, ("usd",)),
+    ("ezdxf", "ezdxf", ask_python, ("dxf",)),
+    ("godot_parser", "godot-parser", ask_python, ("godot",)),
+    ("pytiled_parser", "pytiled-parser", ask_python, ("tiled",)),
 )
 
 

@@ -130,6 +130,19 @@ def usd(path: str) -> Measured:
     return {"area": area, "volume": volume}
 
 
+def pytiled_parser(path: str) -> Measured:
+    (layer,) = import_module("pytiled_parser").parse_map(Path(path)).layers
+    rings = [[(point.x, point.y) for point in thing.points] for thing in layer.tiled_objects]
+    return {"area": 0.5 * sum(abs(_shoelace(ring)) for ring in rings)}
+
+
+def godot_parser(path: str) -> Measured:
+    """The collision shapes."""
+    nodes = import_module("godot_parser").GDScene.load(path).get_nodes()
+    flat = [node.properties["polygon"].args for node in nodes if node.type == "CollisionPolygon2D"]
+    return {"area": 0.5 * sum(abs(_shoelace(list(zip(ring[::2], ring[1::2], strict=True)))) for ring in flat)}
+
+
 def _shoelace(points: list[tuple[float, float]]) -> float:
     return sum(p[0] * q[1] - q[0] * p[1] for p, q in zip(points, points[1:] + points[:1], strict=True))
 
@@ -137,6 +150,7 @@ def _shoelace(points: list[tuple[float, float]]) -> float:
 PACKAGES = {  # what each is called on PyPI
     trimesh: "trimesh", meshio: "meshio", pyvista: "pyvista", open3d: "open3d", pymeshlab: "pymeshlab", igl: "libigl",
     manifold3d: "manifold3d", svgelements: "svgelements", svgpathtools: "svgpathtools", ezdxf: "ezdxf", usd: "usd-core",
+    pytiled_parser: "pytiled-parser", godot_parser: "godot-parser",
 }  # fmt: skip
 
 
