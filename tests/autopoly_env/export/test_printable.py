@@ -1,6 +1,9 @@
 """STL and 3MF: what trimesh and manifold3d make of the files, and what is refused before it is written."""
 
+import re
+import shutil
 import struct
+import subprocess
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -61,6 +64,19 @@ def test_solid__is_a_manifold_for_manifold3d(name: str) -> None:
     solid = manifold3d.Manifold(manifold3d.Mesh(body.vertices.astype(np.float32), body.triangles.astype(np.uint32)))
     assert solid.status() == manifold3d.Error.NoError
     assert solid.volume() == pytest.approx(SHAPES[name].face_areas().sum() * 50.0**2 * 5.0, rel=1e-5)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_solid__has_nothing_for_admesh_to_repair(name: str, tmp_path: Path) -> None:
+    admesh = shutil.which("admesh")
+    if admesh is None:
+        pytest.skip("admesh is not installed (apt-get install admesh)")
+    path = save_stl(to_body(SHAPES[name], 0.1, 50.0), tmp_path / "body.stl")
+    said = subprocess.run([admesh, str(path)], capture_output=True, text=True, check=True).stdout
+    told = {what.strip(): float(value) for what, value in re.findall(r"([A-Z][a-z ]+?) *: *(-?[\d.]+)", said)}
+    repairs = ("Degenerate facets", "Edges fixed", "Facets removed", "Facets added", "Facets reversed", "Normals fixed")
+    assert {what: told[what] for what in repairs} == dict.fromkeys(repairs, 0.0)
+    assert told["Volume"] == pytest.approx(SHAPES[name].face_areas().sum() * 50.0**2 * 5.0, rel=1e-4)
 
 
 @pytest.mark.slow
