@@ -41,7 +41,7 @@ def save_gltf(
     scale 0 or 1; the vertices' moves are a morph target. At rest the last step shows and the others have scale 0,
     in the middle of the last mesh, which all places are relative to: so the box of the scene is that mesh's own. As
     viewers count morph targets in as well, the last mesh is there once more without, as `done`, where it has one. A
-    `texture` is part of the file; what is clear in it is cut out.
+    `texture` is part of the file.
 
     Raises ConfigError for another suffix or a depth below 0 or not finite, SequenceError naming a step that cannot be
     replayed, OutputError if the file cannot be written.
@@ -138,19 +138,18 @@ def _document(sequence: ConstructionSequence, depth: float, texture: Texture | N
     }, bytes(buffer.data)
 
 
-def _look(base: dict[str, Any], more: dict[str, Any] | None = None) -> dict[str, Any]:
+def _look(base: dict[str, Any]) -> dict[str, Any]:
     """The one material."""
     roughness = {"pbrMetallicRoughness": base | {"metallicFactor": 0.0, "roughnessFactor": 0.8}}
-    return {"materials": [{"name": "AutoPoly", "doubleSided": True, **roughness, **(more or {})}]}
+    return {"materials": [{"name": "AutoPoly", "doubleSided": True, **roughness}]}
 
 
 def _textured(buffer: _Buffer, texture: Texture) -> dict[str, Any]:
     """The material with the picture, and where in the file that is."""
-    more = {"alphaMode": "MASK", "alphaCutoff": 0.5} if texture.has_alpha else {}
     image = {"name": "picture", "bufferView": buffer.add_bytes(texture.png), "mimeType": "image/png"}
     sampler = {"wrapS": CLAMP, "wrapT": CLAMP}
     maps = {"images": [image], "samplers": [sampler], "textures": [{"source": 0, "sampler": 0}]}
-    return maps | _look({"baseColorTexture": {"index": 0}}, more)
+    return maps | _look({"baseColorTexture": {"index": 0}})
 
 
 def _middle(solid: Solid) -> FloatArray:

@@ -71,8 +71,7 @@ def save_textured_obj(
     mapped = [f"vt {u!r} {(1.0 - v)!r}" for u, v in places.tolist()]
     lines = [*head, *uses, *vertices, *mapped, *face_lines(faces, is_mapped=True)]
     write_atomically(picture, texture.png)
-    cut = f"map_d {picture.name}\n" if texture.has_alpha else ""
-    write_atomically(material, f"newmtl picture\nKd 1 1 1\nillum 1\nmap_Kd {picture.name}\n{cut}")
+    write_atomically(material, f"newmtl picture\nKd 1 1 1\nillum 1\nmap_Kd {picture.name}\n")
     return write_atomically(path, "\n".join(lines) + "\n")
 
 

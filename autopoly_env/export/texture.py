@@ -6,17 +6,18 @@ from dataclasses import dataclass, field
 import numpy as np
 from PIL import Image
 
-from autopoly_env.arrays import ByteArray, FloatArray
+from autopoly_env.arrays import BoolArray, ByteArray, FloatArray
 from autopoly_env.silhouette import ImageSource, read_picture
+
+OPAQUE = 0.5  # of the opacity
 
 
 @dataclass(frozen=True, eq=False)
 class Texture:
-    """A picture of `shape` (H, W) pixels, upright, as PNG; `has_alpha` if parts of it are clear."""
+    """A picture of `shape` (H, W) pixels, upright and opaque, as PNG."""
 
     png: bytes = field(repr=False)
     shape: tuple[int, int]
-    has_alpha: bool
 
     def places(self, vertices: FloatArray) -> FloatArray:
         """(V, 2) u to the right and v down, 0 to 1 over the picture itself, of places in the unit square.
@@ -32,7 +33,9 @@ class Texture:
 def load_texture(source: ImageSource) -> Texture:
     """The picture of a path, file object, image or array: all that `load_silhouette` reads, its colours kept.
 
-    At most 2048 pixels a side. Raises SilhouetteError where it cannot be read.
+    What is clear takes the colour of the nearest pixel that is not: the mesh is the cut-out, and its rim and walls,
+    which may lie a pixel beside the object, stay whole. At most 2048 pixels a side. Raises SilhouetteError where it
+    cannot be read.
     """
     picture = read_picture(source)
     shown = picture.colour
@@ -40,12 +43,21 @@ def load_texture(source: ImageSource) -> Texture:
         grey = np.ones_like(picture.opacity) if picture.grey is None else picture.grey
         shown = np.repeat(_bytes(grey)[:, :, None], 3, axis=2)
     height, width = shown.shape[:2]
-    has_alpha = picture.opacity is not None and bool((picture.opacity < 1.0).any())
-    if has_alpha:
-        shown = np.dstack((shown, _bytes(picture.opacity)))
+    if picture.opacity is not None:
+        shown = _spread(shown, picture.opacity >= OPAQUE)
     stream = io.BytesIO()
     Image.fromarray(shown).save(stream, "PNG")
-    return Texture(stream.getvalue(), (height, width), has_alpha)
+    return Texture(stream.getvalue(), (height, width))
+
+
+def _spread(colours: ByteArray, is_opaque: BoolArray) -> ByteArray:
+    """(H, W, 3) with the colour of the nearest opaque pixel where there is none."""
+    from scipy.ndimage import distance_transform_edt
+
+    if not is_opaque.any() or is_opaque.all():
+        return colours
+    rows, columns = distance_transform_edt(~is_opaque, return_distances=False, return_indices=True)
+    return np.ascontiguousarray(colours[rows, columns])
 
 
 def _bytes(shares: object) -> ByteArray:
