@@ -40,7 +40,7 @@ def save_gltf(
     of the unit square) makes it a closed solid behind z = 0. The one animation shows a step a second, by the nodes'
     scale 0 or 1; the vertices' moves are a morph target. At rest the last step shows and the others have scale 0,
     in the middle of the last mesh, which all places are relative to: so the box of the scene is that mesh's own. As
-    viewers count morph targets in as well, the last mesh is there once more without, as `done`, where it has one. A
+    viewers count morph targets in as well, the last mesh is there once more without, as `N done`, where it has one. A
     `texture` is part of the file.
 
     Raises ConfigError for another suffix or a depth below 0 or not finite, SequenceError naming a step that cannot be
@@ -114,8 +114,8 @@ def _document(sequence: ConstructionSequence, depth: float, texture: Texture | N
             _animate(buffer, animation, number, "weights", "LINEAR", [begin, begin + MOVE_SECONDS], [1.0, 0.0])
     if "targets" in shapes[-1]["primitives"][0]:
         plain = {name: value for name, value in shapes[-1]["primitives"][0].items() if name != "targets"}
-        shapes.append({"name": "done", "primitives": [plain]})
-        nodes.append({"name": "done", "mesh": len(meshes), "translation": middle.tolist()})
+        shapes.append({"name": f"{len(meshes) - 1} done", "primitives": [plain]})
+        nodes.append({"name": shapes[-1]["name"], "mesh": len(meshes), "translation": middle.tolist()})
         begin = times[-1][0] + MOVE_SECONDS
         times[-1:] = [(times[-1][0], begin), (begin, end)]
     for number, (node, (begin, gone)) in enumerate(zip(nodes, times, strict=True)):

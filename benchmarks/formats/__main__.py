@@ -2,8 +2,9 @@
 
 Six examples are built by `climb` and written in every way that a program reads. It is asked for the area, or for solids
 the volume, and for glTF the box as well; what is within 1e-5 of the mesh's own is right. Prints the tables of
-docs/formats.md. Readers that are not installed are left out. Exit codes: 0 all is right, or right with an option that
-the cell names; 1 something is not; 2 wrong usage; 130 Ctrl-C.
+docs/formats.md. With `--solids FOLDER` slicers look at the solids of all sequences below it instead. Readers that are
+not installed are left out. Exit codes: 0 all is right, or right with an option that the cell names; 1 something is not;
+2 wrong usage; 130 Ctrl-C.
 """
 
 import argparse
@@ -17,6 +18,7 @@ import numpy as np
 from autopoly_env.sequence import ConstructionSequence
 from benchmarks.formats.files import NAMES, VARIANTS, construct, expected, write
 from benchmarks.formats.programs import READERS, Asking, Found, ask_node
+from benchmarks.formats.solids import look_at_solids
 
 TOLERANCE = 1e-5
 BOXED = ("trimesh", "three", "babylon", "open3d", "pyvista")  # that tell the box of a glTF scene
@@ -30,9 +32,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.formats", description=__doc__)
     parser.add_argument("--python", action="append", default=[], help="another interpreter that has readers")
     parser.add_argument("--node", type=Path, metavar="FOLDER", help="where node_modules has three, @babylonjs/...")
+    names = [name for name, *_ in READERS]
+    parser.add_argument("--only", nargs="+", choices=names, default=names, help="these readers", metavar="READER")
+    parser.add_argument("--solids", type=Path, metavar="FOLDER", help="as agents.solve writes them")
     given = parser.parse_args(arguments)
     asking = Asking((*given.python, sys.executable), given.node.resolve() if given.node else None)
     try:
+        if given.solids is not None:
+            lines, is_right = look_at_solids(given.solids, asking)
+            print("\n".join(lines))
+            return int(not is_right)
         sequences = [construct(name) for name in NAMES]
         with tempfile.TemporaryDirectory() as folder:
             files = {
@@ -42,7 +51,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 ]
                 for kind, variant in VARIANTS.items()
             }
-            lines = [*_rows(asking, files, sequences), "", *_boxes(asking, files["gltf"], sequences)]
+            rows = _rows(asking, given.only, files, sequences)
+            lines = [*rows, "", *_boxes(asking, given.only, files["gltf"], sequences)]
     except KeyboardInterrupt:
         print("error: stopped by Ctrl-C", file=sys.stderr)
         return 130
@@ -50,10 +60,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 1 if any(WRONG in line for line in lines) else 0
 
 
-def _rows(asking: Asking, files: Files, sequences: list[ConstructionSequence]) -> list[str]:
+def _rows(asking: Asking, only: Sequence[str], files: Files, sequences: list[ConstructionSequence]) -> list[str]:
     """The table of areas and volumes, a row for each reader and variant."""
     lines = [f"| reader | written with | {' | '.join(NAMES)} |", f"|---|---|{'---|' * len(NAMES)}"]
-    for name, title, ask, kinds in READERS:
+    for name, title, ask, kinds in (reader for reader in READERS if reader[0] in only):
         asked = [*kinds, *(VARIANTS[kind].way_out for kind in kinds if VARIANTS[kind].way_out)]
         answer = ask(name, asking, [path for kind in asked for path in files[kind]])
         if answer is None:
@@ -96,11 +106,11 @@ def _is_right(ratio: float) -> bool:
     return abs(ratio - 1.0) <= TOLERANCE
 
 
-def _boxes(asking: Asking, paths: list[Path], sequences: list[ConstructionSequence]) -> list[str]:
+def _boxes(asking: Asking, only: Sequence[str], paths: list[Path], sequences: list[ConstructionSequence]) -> list[str]:
     """How far the box of the scene, as readers have it, is from the mesh's own at most; the validator's messages."""
     lines = ["| reader of glTF | farthest from the mesh's own box |", "|---|---|"]
     for name, title, ask, _ in READERS:
-        answer = ask(name, asking, paths) if name in BOXED else None
+        answer = ask(name, asking, paths) if name in BOXED and name in only else None
         if answer is None:
             continue
         gaps = []

@@ -2,12 +2,15 @@
 
 import json
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
 import bpy
 
-SVG_UNIT = 0.0254 / 90.0  # metres a user unit, as its importer takes them
+SIDE = 512  # user units of our drawings
+SQUARE = f'<svg xmlns="http://www.w3.org/2000/svg" width="{SIDE}" height="{SIDE}" viewBox="0 0 {SIDE} {SIDE}">'
+SQUARE += f'<path id="face-0" d="M 0 0 L {SIDE} 0 L {SIDE} {SIDE} L 0 {SIDE} Z"/></svg>'
 
 
 def read(path: str) -> dict[str, object]:
@@ -23,9 +26,9 @@ def read(path: str) -> dict[str, object]:
     elif ending == ".svg":
         bpy.ops.import_curve.svg(filepath=path)
     area = volume = 0.0
+    if ending == ".svg":
+        return {"area": area_of_curves() * SIDE**2 / square()}
     for thing in bpy.context.scene.objects:
-        if thing.type == "CURVE" and "face-" in thing.name:
-            area += sum(inside(spline, thing.matrix_world) for spline in thing.data.splines) / SVG_UNIT**2
         if thing.type != "MESH":
             continue
         shape = thing.to_mesh()
@@ -36,6 +39,20 @@ def read(path: str) -> dict[str, object]:
             a, b, c = (shape.vertices[k].co for k in triangle.vertices)
             volume += a.dot(b.cross(c)) / 6.0
     return {"area": area, "volume": volume}
+
+
+def area_of_curves() -> float:
+    faces = [thing for thing in bpy.context.scene.objects if thing.type == "CURVE" and "face-" in thing.name]
+    return sum(inside(spline, face.matrix_world) for face in faces for spline in face.data.splines)
+
+
+def square() -> float:
+    """What a drawing of one square as large as ours has: the importer's units are nearly, not quite, 1/90 inch."""
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder, "square.svg").write_text(SQUARE)
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        bpy.ops.import_curve.svg(filepath=str(Path(folder, "square.svg")))
+        return area_of_curves()
 
 
 def inside(spline: Any, to_world: Any) -> float:

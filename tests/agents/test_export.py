@@ -198,6 +198,16 @@ def test_texture__is_put_on_obj_and_gltf(run: Run) -> None:
     assert (done.code, done.out, len(done.err.splitlines())) == (1, "", 1) and "none.png" in done.err
 
 
+@pytest.mark.parametrize(("name", "module"), [("dxf", "ezdxf"), ("usd", "pxr.Usd")])
+def test_format_without_its_package__is_one_line(
+    run: Run, name: str, module: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, module, None)
+    done = run(saved(), "--to", name)
+    assert (done.code, done.out, len(done.err.splitlines())) == (2, "", 1)
+    assert f"pip install -e '.[{name}]' in the checkout" in done.err and os.listdir() == ["house.json"]
+
+
 def test_endings_of_two_parts__go_before_those_of_one(run: Run) -> None:
     for name in ("a.mesh.png", "a.mask.png", "a.png"):
         assert run(saved(), "--out", name).code == 0

@@ -1,5 +1,6 @@
 """The table of readers: what counts as right, and a reader that is asked for real."""
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +10,7 @@ import pytest
 from benchmarks.formats import __main__ as table
 from benchmarks.formats.files import VARIANTS, expected, write
 from benchmarks.formats.programs import READERS, Asking, ask_python
+from benchmarks.formats.solids import look_at_solids
 from tests.helpers.sequences import gabled
 
 ASKING = Asking((sys.executable,), None)
@@ -39,6 +41,16 @@ def test_trimesh__is_asked_and_finds_what_is_there(tmp_path: Path) -> None:
     assert answer is not None and answer[0]
     for kind, found in zip(kinds, answer[1], strict=True):
         assert found[VARIANTS[kind].measure] == pytest.approx(expected(gabled(), kind), rel=1e-5)
+
+
+@pytest.mark.slow
+def test_solids_of_a_folder__are_looked_at(tmp_path: Path) -> None:
+    gabled().save(tmp_path / "sequence.json")
+    lines, is_right = look_at_solids(tmp_path, ASKING)
+    assert is_right and len(lines) >= 2 + (shutil.which("admesh") is not None)
+    assert all(" | 1 | 0 | " in line for line in lines[2:])
+    (tmp_path / "none").mkdir()
+    assert not look_at_solids(tmp_path / "none", ASKING)[1]
 
 
 def test_reader__that_is_not_there_is_no_answer() -> None:
