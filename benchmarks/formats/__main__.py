@@ -21,7 +21,7 @@ from benchmarks.formats.programs import READERS, Asking, Found, ask_node
 from benchmarks.formats.solids import look_at_solids
 
 TOLERANCE = 1e-5
-BOXED = ("trimesh", "three", "babylon", "open3d", "pyvista")  # that tell the box of a glTF scene
+BOXED = ("trimesh", "three", "model-viewer", "babylon", "open3d", "pyvista")  # that tell the box of a glTF scene
 RIGHT, WRONG = "right", "**wrong**"
 
 Files = dict[str, list[Path]]  # of each variant, one for each example
@@ -63,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _rows(asking: Asking, only: Sequence[str], files: Files, sequences: list[ConstructionSequence]) -> list[str]:
     """The table of areas and volumes, a row for each reader and variant."""
     lines = [f"| reader | written with | {' | '.join(NAMES)} |", f"|---|---|{'---|' * len(NAMES)}"]
-    for name, title, ask, kinds in (reader for reader in READERS if reader[0] in only):
+    for name, title, ask, kinds in (reader for reader in READERS if reader[0] in only and reader[3]):
         asked = [*kinds, *(VARIANTS[kind].way_out for kind in kinds if VARIANTS[kind].way_out)]
         answer = ask(name, asking, [path for kind in asked for path in files[kind]])
         if answer is None:

@@ -13,6 +13,7 @@ from typing import Any
 
 from autopoly_env.errors import AutoPolyError
 from autopoly_env.export.blender import find_blender
+from benchmarks.formats.in_chromium import boxes
 
 HERE = Path(__file__).parent
 SECONDS = 300.0  # for a reader and all its files
@@ -43,6 +44,10 @@ def ask_node(name: str, asking: Asking, paths: Sequence[Path]) -> Answer | None:
     if node is None or asking.node_folder is None:
         return None
     return _answer([node, str(HERE / "readers.mjs"), name, str(asking.node_folder), *map(str, paths)])
+
+
+def ask_chromium(_: str, asking: Asking, paths: Sequence[Path]) -> Answer | None:
+    return boxes(asking.node_folder, paths) if asking.node_folder else None
 
 
 def ask_admesh(_: str, asking: Asking, paths: Sequence[Path]) -> Answer | None:
@@ -102,6 +107,7 @@ Ask = Callable[[str, Asking, Sequence[Path]], Answer | None]
 # Reader, what it is called in the table, what it is asked by, and the variants that it reads at all.
 READERS: tuple[tuple[str, str, Ask, tuple[str, ...]], ...] = (
     ("three", "three.js", ask_node, ("obj", "solid", "gltf", "stl", "3mf", "svg", "svg-layers")),
+    ("model-viewer", "model-viewer", ask_chromium, ()),  # which tells the box only
     ("babylon", "Babylon.js", ask_node, ("obj", "solid", "gltf", "stl")),
     ("trimesh", "trimesh", ask_python, ("obj", "solid", "gltf", "stl", "3mf")),
     ("open3d", "Open3D", ask_python, ("obj", "solid", "gltf", "stl")),
