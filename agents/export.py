@@ -4,7 +4,7 @@ import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -17,12 +17,13 @@ from autopoly_env.outside import described
 from autopoly_env.shown import tame
 
 if TYPE_CHECKING:
+    from autopoly_env.export.texture import Texture
     from autopoly_env.sequence import ConstructionSequence
 
 DEFAULT = "html"
 _CHECK = "autopoly_env.conformance.check_format shows where"
 
-_FORMATS = "\n".join(f"  {name:8} {line}" for name, _, line in LISTED)
+_FORMATS = "\n".join(f"  {name:11} {line}" for name, _, line in LISTED)
 
 HELP = f"""Write construction sequences in another format.
 
@@ -33,6 +34,7 @@ Examples:
   python -m agents.export out/chair/sequence.json --out chair.obj
   python -m agents.export out/chair/sequence.json --to svg --step 4
   python -m agents.export out/*/sequence.json --to gltf --depth 0.1 --out glTF
+  python -m agents.export out/key/sequence.json --to stl --depth 0.05 --size 80
 
 \b
 Formats:
@@ -78,6 +80,19 @@ def export(
     depth: Annotated[
         float, typer.Option(help="Thickness of the mesh, in units of the unit square, in formats that show it.")
     ] = 0.0,
+    size: Annotated[
+        float | None,
+        typer.Option(
+            help="Side of the picture: millimetres (stl, 3mf, dxf; 100) or pixels (png, godot, convex-json; 512).",
+            show_default="the format's own",
+        ),
+    ] = None,
+    triangles: Annotated[bool, typer.Option("--triangles", help="Cut faces into triangles (obj).")] = False,
+    layers: Annotated[bool, typer.Option("--layers", help="All steps, a layer each (svg).")] = False,
+    texture: Annotated[
+        Path | None,
+        typer.Option(metavar="IMAGE", help="The picture on the mesh (obj, gltf).", show_default="none"),
+    ] = None,
     operators: OutsideOperators = None,
     object_: pictures.Object = "auto",
     background: pictures.Background = None,
@@ -98,20 +113,18 @@ def export(
     if target is None and (show_mask or pictures.as_dict(picture)):
         raise ConfigError("--object, --show-mask and the like are about the picture of --target; give one")
     made = _choose(to, out, len(sources))
-    if depth and not made.shows_depth:
-        able = [name for name, other in formats().items() if other.shows_depth]
-        raise ConfigError(f"--depth {depth}: {made.name} is flat; use it with {', '.join(able)}")
-    if target and not made.shows_target:
-        able = [name for name, other in formats().items() if other.shows_target]
-        raise ConfigError(f"--target {target}: {made.name} shows no target; use it with {', '.join(able)}")
+    _refuse_what_is_not_shown(
+        made, depth=depth, target=target, size=size, triangles=triangles, layers=layers, texture=texture
+    )
     jobs = list(_name_outputs(sources, out, made.suffix))
     silhouette = load_silhouette(target, options=picture) if target else None
     if silhouette is not None and show_mask:
         print(pictures.save_mask(silhouette, jobs[0][1].with_name(f"{silhouette.name}-{pictures.MASK}")))
+    shown = _load_texture(texture) if texture else None
     n_failed = 0
     for source, goal in jobs:
         try:
-            _write(made, Export(_load(source, step), silhouette, depth), goal)
+            _write(made, Export(_load(source, step), silhouette, depth, size, triangles, layers, shown), goal)
             print(tame(str(goal)))
         except ConfigError:
             raise
@@ -132,15 +145,30 @@ def _choose(to: str | None, out: Path | None, n: int) -> Format:
     if out is None or not out.suffix or os.path.isdir(out):
         return named or find_format(DEFAULT)
     if n > 1:  # to go into a folder, which may have a dot in its name
-        if out.suffix.lower() in {suffix for other in formats().values() for suffix in other.suffixes}:
+        if out.suffix.lower() in {
+            Path(f"_{suffix}").suffix for other in formats().values() for suffix in other.suffixes
+        }:
             raise ConfigError(f"--out {out}: one file for {n} sequences; give a folder")
         return named or find_format(DEFAULT)
     if named is None:
         return format_of(out)
-    if out.suffix.lower() not in named.suffixes:
+    if out.suffix.lower() not in {Path(f"_{suffix}").suffix for suffix in named.suffixes}:
         endings = " or ".join(named.suffixes)
         raise ConfigError(f"--out {out} with --to {to}: expected a file name that ends in {endings}; leave one out")
     return named
+
+
+_WHY = {"depth": "is flat", "target": "shows no target", "size": "has a size of its own"}
+
+
+def _refuse_what_is_not_shown(made: Format, **given: Any) -> None:
+    """Raise ConfigError for an option that the format does not heed; 0, no and None ask for nothing."""
+    for name, value in given.items():
+        if value is None or value is False or (name == "depth" and not value) or name in made.heeded:
+            continue
+        able = ", ".join(other.name for other in formats().values() if name in other.heeded)
+        shown = f"--{name}" if value is True else f"--{name} {value}"
+        raise ConfigError(f"{shown}: {made.name} {_WHY.get(name, 'has nothing of the kind')}; use it with {able}")
 
 
 def _write(made: Format, export: Export, goal: Path) -> None:
@@ -156,6 +184,13 @@ def _write(made: Format, export: Export, goal: Path) -> None:
         raise OutputError(f"{who}, failed: {what}; expected a file or an OutputError ({_CHECK})") from error
     if not os.path.exists(goal):
         raise OutputError(f"{who}, made no such file ({_CHECK})")
+
+
+def _load_texture(path: Path) -> "Texture":
+    """The picture in a file. Raises SilhouetteError."""
+    from autopoly_env.export.texture import load_texture
+
+    return load_texture(path)
 
 
 def _load(path: Path, step: int | None) -> "ConstructionSequence":

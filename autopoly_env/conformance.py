@@ -166,6 +166,11 @@ def _sample_exports(made: Format) -> Iterator[Export]:
         yield Export(sequence, target=Silhouette(np.eye(_LOOK, dtype=bool)))
     if made.shows_depth:
         yield Export(sequence, depth=0.25)
+    if "size" in made.options:
+        yield Export(sequence, size=32.0)
+    switches = {"triangles", "layers"}.intersection(made.options)
+    if switches:
+        yield Export(sequence, triangles="triangles" in switches, layers="layers" in switches)
 
 
 def _written(made: Format, export: Export, path: Path, where: str) -> None:

@@ -5,18 +5,22 @@ from pathlib import Path
 
 from autopoly_env.errors import MeshError
 from autopoly_env.export.formats import Export, Format, register_format
-from autopoly_env.export.solid import to_solid_obj
+from autopoly_env.export.solid import face_lines, solid_lines, to_solid_obj
+from autopoly_env.export.texture import Texture
+from autopoly_env.export.triangles import is_concave, triangulate
 from autopoly_env.files import read_text, write_atomically
-from autopoly_env.mesh import PolyMesh
+from autopoly_env.mesh import Face, PolyMesh
 
 MOST_BYTES = 16_000_000  # of a file
+WAY_OUT = "agents.export --to obj --triangles cuts them"
 
 
-def to_obj(mesh: PolyMesh) -> str:
+def to_obj(mesh: PolyMesh, *, triangles: bool = False) -> str:
     """The mesh as OBJ text: in the unit square at z = 0 with y up, floats with all their digits.
 
-    Faces keep their n corners and their first one. They run the other way round than in `mesh`, because turning y up
-    mirrors the picture: a face of positive area has positive area there too, and looks towards +z.
+    Faces keep their n corners and their first one, or are cut into triangles. They run the other way round than in
+    `mesh`, because turning y up mirrors the picture: a face of positive area has positive area there too, and looks
+    towards +z. Where n-gons are concave a line at the top says so: many readers take them for larger than they are.
 
     >>> print(to_obj(PolyMesh.rectangle(0.0, 0.0, 1.0, 0.5)), end="")
     # AutoPoly: 4 vertices, 4 edges, 1 face; unit square, y up
@@ -26,13 +30,49 @@ def to_obj(mesh: PolyMesh) -> str:
     v 0.0 0.5 0
     f 1 4 3 2
     """
+    head, vertices, faces = _flat_lines(mesh, triangles)
+    return "\n".join([*head, *vertices, *face_lines(faces)]) + "\n"
+
+
+def _flat_lines(mesh: PolyMesh, triangles: bool) -> tuple[list[str], list[str], list[Face]]:
+    """Comments, `v` lines and faces of a flat mesh, y up."""
     n_vertices, n_edges, n_faces = mesh.counts
-    faces = f"{n_faces} face" + ("s" if n_faces != 1 else "")
-    lines = [f"# AutoPoly: {n_vertices} vertices, {n_edges} edges, {faces}; unit square, y up"]
-    lines += [f"v {x!r} {(1.0 - y)!r} 0" for x, y in mesh.vertices.tolist()]
-    for first, *others in mesh.faces:
-        lines.append(" ".join(["f", *(str(v + 1) for v in (first, *reversed(others)))]))
-    return "\n".join(lines) + "\n"
+    told = f"{n_faces} face" + ("s" if n_faces != 1 else "")
+    head = [f"# AutoPoly: {n_vertices} vertices, {n_edges} edges, {told}; unit square, y up"]
+    points, faces = mesh.vertices.tolist(), list(mesh.faces)
+    rings = [[points[v] for v in face] for face in faces]
+    if triangles:
+        pairs = zip(mesh.faces, rings, strict=True)
+        faces = [tuple(face[k] for k in cut) for face, ring in pairs for cut in triangulate(ring)]
+        head.append(f"# cut into {len(faces)} triangles")
+    elif n_concave := sum(map(is_concave, rings)):
+        head.append(f"# {n_concave} of them concave, which some readers fan from a corner: {WAY_OUT}")
+    vertices = [f"v {x!r} {(1.0 - y)!r} 0" for x, y in points]
+    return head, vertices, [(first, *reversed(others)) for first, *others in faces]
+
+
+def save_textured_obj(
+    mesh: PolyMesh, path: str | os.PathLike[str], texture: Texture, depth: float = 0.0, *, triangles: bool = False
+) -> Path:
+    """Write the mesh, or its solid, as OBJ with the picture on it: beside it NAME.mtl and NAME.texture.png.
+
+    Each vertex has its place in the picture (`vt`, v up). Raises OutputError if a file cannot be written.
+    """
+    path = Path(path)
+    stem = "".join(sign if sign.isprintable() and not sign.isspace() else "_" for sign in path.stem) or "mesh"
+    picture, material = path.with_name(f"{stem}.texture.png"), path.with_name(f"{stem}.mtl")
+    if depth:
+        head, vertices, faces, sources = solid_lines(mesh, depth, triangles)
+        places = texture.places(mesh.vertices)[list(sources)]
+    else:
+        head, vertices, faces = _flat_lines(mesh, triangles)
+        places = texture.places(mesh.vertices)
+    uses = [f"mtllib {material.name}", "usemtl picture"]
+    mapped = [f"vt {u!r} {(1.0 - v)!r}" for u, v in places.tolist()]
+    lines = [*head, *uses, *vertices, *mapped, *face_lines(faces, is_mapped=True)]
+    write_atomically(picture, texture.png)
+    write_atomically(material, f"newmtl picture\nKd 1 1 1\nillum 1\nmap_Kd {picture.name}\n")
+    return write_atomically(path, "\n".join(lines) + "\n")
 
 
 def from_obj(text: str) -> PolyMesh:
@@ -88,10 +128,20 @@ def _vertex(corner: str, n_vertices: int) -> int:
 
 
 def _write(export: Export, path: Path) -> Path:
-    mesh = export.sequence.final()
-    return write_atomically(path, to_solid_obj(mesh, export.depth) if export.depth else to_obj(mesh))
+    mesh, depth, triangles = export.sequence.final(), export.depth, export.triangles
+    if export.texture:
+        return save_textured_obj(mesh, path, export.texture, depth, triangles=triangles)
+    text = to_solid_obj(mesh, depth, triangles=triangles) if depth else to_obj(mesh, triangles=triangles)
+    return write_atomically(path, text)
 
 
 register_format(
-    Format("obj", (".obj",), "the last mesh, with its n-gons; a solid of them with --depth", _write, shows_depth=True)
+    Format(
+        "obj",
+        (".obj",),
+        "the last mesh, with its n-gons; a solid with --depth",
+        _write,
+        shows_depth=True,
+        options=("triangles", "texture"),
+    )
 )

@@ -29,6 +29,7 @@ def sequence_to_svg(sequence: ConstructionSequence, *, size: int = 512, target: 
 
     Within it everything is as `to_svg` has it, with `step-<k>-` before its id, because an id may stand only once in a
     file: `step-3-face-7`, `step-3-vertex-12`. Inkscape shows the steps as layers, labelled with their operators.
+    Programs that pass over `display:none`, Blender's import and many cutters' among them, show all steps at once.
     Raises SequenceError if the replay fails.
     """
     lines = []
@@ -49,11 +50,18 @@ def _background(target: Silhouette | None, size: int) -> list[str]:
 
 
 def _write(export: Export, path: Path) -> Path:
-    return write_atomically(path, sequence_to_svg(export.sequence, target=export.target))
+    if export.layers:
+        return write_atomically(path, sequence_to_svg(export.sequence, target=export.target))
+    return write_atomically(path, to_svg(export.sequence.final(), target=export.target))
 
 
 register_format(
     Format(
-        "svg", (".svg",), "a drawing to edit, a layer for each step, the last one visible", _write, shows_target=True
+        "svg",
+        (".svg",),
+        "a drawing of the last mesh to edit; all steps with --layers",
+        _write,
+        shows_target=True,
+        options=("layers",),
     )
 )

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 Point = Sequence[float]
 Triangle = tuple[int, int, int]
+TINY = 1e-12  # twice an area, in squares of the unit square: what rounding makes of a straight corner
 
 
 def triangulate(ring: Sequence[Point]) -> list[Triangle]:
@@ -25,6 +26,14 @@ def triangulate(ring: Sequence[Point]) -> list[Triangle]:
         triangles.append((left[at - 1], left[at], left[(at + 1) % len(left)]))
         del left[at]
     return [*triangles, (left[0], left[1], left[2])]
+
+
+def is_concave(ring: Sequence[Point]) -> bool:
+    """Whether a corner of the face turns the other way than the face runs; straight corners do not."""
+    n = len(ring)
+    turns = [_area(ring[k - 1], ring[k], ring[(k + 1) % n]) for k in range(n)]
+    area = sum(_area(ring[0], ring[k], ring[k + 1]) for k in range(1, n - 1))
+    return min(turns) < -TINY if area > 0.0 else max(turns) > TINY
 
 
 def _ear(ring: Sequence[Point], left: list[int]) -> int:

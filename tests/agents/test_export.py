@@ -17,12 +17,12 @@ from PIL import Image
 
 from agents.export import main
 from autopoly_env.errors import ConfigError
-from autopoly_env.export import to_obj
+from autopoly_env.export import to_obj, to_svg
 from autopoly_env.export.formats import LISTED, Format, find_format, formats, register_format
 from autopoly_env.export.solid import to_solid_obj
 from autopoly_env.sequence import ConstructionSequence
 from tests.helpers.commands import Run, runner
-from tests.helpers.constructions import STEPS, house
+from tests.helpers.constructions import STEPS, house, score
 from tests.helpers.paths import ROOT
 
 FORMATS = formats()
@@ -71,7 +71,7 @@ def test_every_format__is_written_beside_the_sequence_and_named(run: Run, name: 
     assert (done.code, done.err) == (0, "")
     (written,) = set(os.listdir("work")) - {"house.json"}
     assert done.out.split() == [f"work/{written}"]
-    assert Path(written).stem == "house" and Path("work", written).stat().st_size > 300
+    assert written == f"house{FORMATS[name].suffix}" and Path("work", written).stat().st_size > 300
 
 
 def test_html__is_the_default_and_shows_the_target(run: Run) -> None:
@@ -101,8 +101,16 @@ def visible_steps(root: ET.Element) -> list[str | None]:
     return [g.get("id") for g in root if g.tag == f"{SVG}g" and "display:none" not in g.get("style", "")]
 
 
-def test_svg__has_a_group_for_each_step_and_shows_the_last(run: Run) -> None:
-    run(saved(), "--to", "svg", "--target", target_image())
+def test_svg__is_the_last_mesh_or_that_of_a_step(run: Run) -> None:
+    meshes = house().meshes()
+    run(saved(), "--to", "svg")
+    run("house.json", "--to", "svg", "--step", 2, "--out", "step.svg")
+    assert (Path("house.svg").read_text(), Path("step.svg").read_text()) == (to_svg(meshes[-1]), to_svg(meshes[2]))
+    assert "display:none" not in Path("house.svg").read_text()
+
+
+def test_svg_with_layers__has_a_group_for_each_step_and_shows_the_last(run: Run) -> None:
+    run(saved(), "--to", "svg", "--layers", "--target", target_image())
     root = ET.parse("house.svg").getroot()
     assert [child.get("id") for child in root] == ["target", *(f"step-{k}" for k in range(len(STEPS) + 1))]
     assert visible_steps(root) == [f"step-{len(STEPS)}"]
@@ -115,8 +123,8 @@ def test_svg__has_a_group_for_each_step_and_shows_the_last(run: Run) -> None:
         assert len(inside) == 4 + mesh.complexity  # the group itself and the three in it
 
 
-def test_svg__of_a_step_ends_there(run: Run) -> None:
-    run(saved(), "--to", "svg", "--step", 2)
+def test_svg_with_layers__of_a_step_ends_there(run: Run) -> None:
+    run(saved(), "--to", "svg", "--step", 2, "--layers")
     root = ET.parse("house.svg").getroot()
     assert [child.get("id") for child in root] == ["step-0", "step-1", "step-2"]
     assert visible_steps(root) == ["step-2"]
@@ -164,6 +172,71 @@ def test_ending_of_the_file__decides_where_no_format_is_named(run: Run, ending: 
 def test_obj_with_depth__is_the_solid(run: Run) -> None:
     run(saved(), "--out", "solid.obj", "--depth", 0.2)
     assert Path("solid.obj").read_text() == to_solid_obj(house().final(), 0.2)
+
+
+def test_triangles__reach_obj_flat_and_solid(run: Run) -> None:
+    run(saved(), "--out", "flat.obj", "--triangles")
+    run("house.json", "--out", "solid.obj", "--triangles", "--depth", 0.2)
+    assert Path("flat.obj").read_text() == to_obj(house().final(), triangles=True)
+    assert Path("solid.obj").read_text() == to_solid_obj(house().final(), 0.2, triangles=True)
+
+
+@pytest.mark.parametrize("name", ["stl", "3mf"])
+def test_depth_and_size__reach_the_formats_for_printers(run: Run, name: str) -> None:
+    for k, given in enumerate(([], ["--size", 20], ["--size", 20, "--depth", 0.5])):
+        assert run(saved(), "--to", name, *given, "--out", f"{k}.{name}").code == 0
+    assert len({Path(f"{k}.{name}").read_bytes() for k in range(3)}) == 3
+
+
+def test_texture__is_put_on_obj_and_gltf(run: Run) -> None:
+    saved("work/house.json")
+    assert run("work/house.json", "--to", "obj", "--texture", target_image()).code == 0
+    assert sorted(os.listdir("work")) == ["house.json", "house.mtl", "house.obj", "house.texture.png"]
+    assert run("work/house.json", "--out", "house.gltf", "--texture", "target.png", "--depth", 0.1).code == 0
+    assert "TEXCOORD_0" in Path("house.gltf").read_text()
+    done = run("work/house.json", "--to", "obj", "--texture", "none.png")
+    assert (done.code, done.out, len(done.err.splitlines())) == (1, "", 1) and "none.png" in done.err
+
+
+@pytest.mark.parametrize(("name", "module"), [("dxf", "ezdxf"), ("usd", "pxr.Usd")])
+def test_format_without_its_package__is_one_line(
+    run: Run, name: str, module: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, module, None)
+    done = run(saved(), "--to", name)
+    assert (done.code, done.out, len(done.err.splitlines())) == (2, "", 1)
+    assert f"pip install -e '.[{name}]' in the checkout" in done.err and os.listdir() == ["house.json"]
+
+
+def test_endings_of_two_parts__go_before_those_of_one(run: Run) -> None:
+    for name in ("a.mesh.png", "a.mask.png", "a.png"):
+        assert run(saved(), "--out", name).code == 0
+    assert run("house.json", "--to", "mask-png", "--out", "plain.png").code == 0
+    modes = {name: Image.open(name).mode for name in ("a.mesh.png", "a.mask.png", "a.png", "plain.png")}
+    assert modes == {"a.mesh.png": "RGBA", "a.mask.png": "L", "a.png": "RGB", "plain.png": "L"}
+    assert run("house.json", "--to", "convex-json").code == 0 and Path("house.convex.json").exists()
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_name_of_markup__is_written_by_every_format(run: Run, name: str) -> None:
+    odd = '</script><b>"\'"\\ & ]]> {{x}} %s\n[node]\x00'
+    done = run(saved("odd.json", house(settings={"target": odd})), "--to", name, "--out", "odd/")
+    assert (done.code, done.err) == (0, "")
+    (written,) = Path("odd").iterdir()
+    if written.suffix in (".svg", ".gltf", ".json", ".py", ".tscn", ".usda"):
+        text = written.read_text(encoding="utf-8")
+        assert "\n[node]" not in text and "\x00" not in text
+        {".svg": ET.fromstring, ".gltf": json.loads, ".json": json.loads, ".py": ast.parse}.get(written.suffix, str)(
+            text
+        )
+
+
+def test_solid_that_is_none__is_one_line_and_exit_code_1(run: Run) -> None:
+    start = house().meshes()[0]
+    flipped = ConstructionSequence({}, start.with_vertices(start.vertices[[1, 0, 3, 2]]), score(50.0))
+    done = run(saved("flipped.json", flipped), "--to", "stl", "--depth", 0.1)
+    assert (done.code, done.out, len(done.err.splitlines())) == (1, "", 1)
+    assert "the volume would be -" in done.err and os.listdir() == ["flipped.json"]
 
 
 def test_several_into_a_folder_with_a_dot__are_written_there(run: Run) -> None:
@@ -250,10 +323,22 @@ def test_missing_file__does_not_keep_the_others_from_being_written(run: Run) -> 
         ([], "Missing argument"),
         (
             ["house.json", "--to", "fbx"],
-            "unknown format 'fbx'; give one of html, svg, obj, gltf, gif, png, blender, or my.module:FORMAT",
+            "unknown format 'fbx'; give one of html, svg, obj, gltf, gif, png, blender, stl, 3mf, usd, dxf, godot, ",
         ),
         (["house.json", "--to", "svg", "--depth", "1"], "--depth 1.0: svg is flat; use it with obj, gltf, blender"),
         (["house.json", "--to", "obj", "--depth", "-1"], "depth -1.0"),
+        (["house.json", "--to", "stl", "--depth", "-1"], "depth -1.0"),
+        (["house.json", "--to", "stl", "--depth", "thick"], "Invalid value for '--depth'"),
+        (["house.json", "--to", "stl", "--size", "0"], "size 0.0: expected the side of the picture, above 0"),
+        (["house.json", "--to", "3mf", "--size", "-5"], "size -5.0: expected the side of the picture, above 0"),
+        (["house.json", "--to", "3mf", "--size", "nan"], "size nan: expected"),
+        (["house.json", "--to", "obj", "--size", "5"], "--size 5.0: obj has a size of its own; use it with stl, 3mf"),
+        (["house.json", "--to", "mask-png", "--size", "0"], "size 0.0: expected a whole number of pixels"),
+        (["house.json", "--to", "godot", "--size", "-1"], "size -1.0: expected the side of the picture"),
+        (["house.json", "--to", "stl", "--texture", "t.png"], "--texture t.png: stl has nothing of the kind; use it"),
+        (["house.json", "--to", "mesh-png", "--out", "a.gif"], "expected a file name that ends in .mesh.png"),
+        (["house.json", "--to", "svg", "--triangles"], "--triangles: svg has nothing of the kind; use it with obj"),
+        (["house.json", "--to", "obj", "--layers"], "--layers: obj has nothing of the kind; use it with svg"),
         (["house.json", "--to", "gltf", "--depth", "nan"], "depth nan"),
         (["house.json", "--to", "gltf", "--depth", "-1"], "depth -1.0"),
         (["house.json", "--to", "obj", "--target", "t.png"], "--target t.png: obj shows no target; use it with html"),

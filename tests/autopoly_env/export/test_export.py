@@ -56,10 +56,24 @@ def test_obj__of_a_mesh_with_a_hole_keeps_every_quad() -> None:
     np.testing.assert_allclose([shoelace(points[face, :2]) for face in faces], 0.8 * 0.8 / 9)
 
 
-def test_obj__keeps_a_concave_face_whole() -> None:
-    outline = [(0.1, 0.1), (0.4, 0.1), (0.4, 0.5), (0.9, 0.5), (0.9, 0.9), (0.1, 0.9)]
-    _, faces = read_obj(to_obj(PolyMesh.from_faces(outline, [range(6)])))
+ELL = PolyMesh.from_faces([(0.1, 0.1), (0.4, 0.1), (0.4, 0.5), (0.9, 0.5), (0.9, 0.9), (0.1, 0.9)], [range(6)])
+
+
+def test_obj__keeps_a_concave_face_whole_and_says_so() -> None:
+    _, faces = read_obj(to_obj(ELL))
     assert faces == [[0, 5, 4, 3, 2, 1]]
+    says = "# 1 of them concave, which some readers fan from a corner: agents.export --to obj --triangles cuts them"
+    assert to_obj(ELL).splitlines()[1] == says and "concave" not in to_obj(QUAD) + to_obj(ELL, triangles=True)
+
+
+@pytest.mark.parametrize("mesh", [ELL, RING, hourglass(), polygon(star(5, 31))], ids=["ell", "ring", "pinch", "star"])
+def test_obj_in_triangles__has_the_right_area_in_trimesh(mesh: PolyMesh, tmp_path: Path) -> None:
+    trimesh = pytest.importorskip("trimesh", reason="trimesh is not installed (pip install trimesh)")
+    (tmp_path / "mesh.obj").write_text(to_obj(mesh, triangles=True))
+    read = trimesh.load_mesh(tmp_path / "mesh.obj")
+    assert read.area == pytest.approx(mesh.face_areas().sum(), rel=1e-9) and (read.face_normals[:, 2] > 0.0).all()
+    assert len(read.faces) == sum(len(face) - 2 for face in mesh.faces)
+    np.testing.assert_allclose(from_obj(to_obj(mesh, triangles=True)).vertices, mesh.vertices, atol=1e-15)
 
 
 @given(st.lists(st.floats(0, 1), min_size=8, max_size=8))

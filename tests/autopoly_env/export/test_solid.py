@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from autopoly_env.errors import ConfigError
-from autopoly_env.export.solid import Solid, to_solid, to_solid_obj, to_triangles
-from autopoly_env.export.triangles import triangulate
+from autopoly_env.export.solid import APART, Solid, to_solid, to_solid_obj, to_triangles
+from autopoly_env.export.triangles import is_concave, triangulate
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import OPERATORS
 from tests.helpers.shapes import hourglass, polygon, star
@@ -65,7 +65,10 @@ def test_solid_with_a_hole__has_walls_inside_it() -> None:
 def test_solid_with_a_pinch__has_a_vertex_for_either_side(mesh: PolyMesh) -> None:
     solid = to_solid(mesh, 0.2)
     assert len(solid.vertices) == 2 * (len(mesh.vertices) + 1)
-    assert is_closed(solid.faces) and volume(solid) == pytest.approx(0.2 * mesh.face_areas().sum())
+    assert is_closed(solid.faces) and volume(solid) == pytest.approx(0.2 * mesh.face_areas().sum(), rel=1e-5)
+    front = solid.vertices[: len(mesh.vertices) + 1, :2]
+    gaps = np.linalg.norm(front[:, None] - front, axis=2) + np.eye(len(front))
+    assert 0.5 * APART < gaps.min() < 2.1 * APART  # drawn apart, by no more than a printer's step
 
 
 @pytest.mark.slow
@@ -73,7 +76,8 @@ def test_solid_with_a_pinch__has_a_vertex_for_either_side(mesh: PolyMesh) -> Non
 def test_solid__is_closed_and_has_the_volume_area_times_depth(mesh: PolyMesh, depth: float) -> None:
     solid = to_solid(mesh, depth)
     assert is_closed(solid.faces)
-    assert volume(solid) == pytest.approx(depth * mesh.face_areas().sum(), abs=1e-9)
+    slack = APART * depth * np.abs(mesh.vertices[mesh.edges[:, 0]] - mesh.vertices[mesh.edges[:, 1]]).sum()
+    assert volume(solid) == pytest.approx(depth * mesh.face_areas().sum(), abs=1e-9 + 2.0 * slack)
 
 
 @pytest.mark.slow
@@ -91,9 +95,18 @@ def test_solid__is_watertight_for_trimesh() -> None:
     trimesh = pytest.importorskip("trimesh", reason="trimesh is not installed (pip install trimesh)")
     for mesh in (QUAD, RING, hourglass(), DIAGONAL, polygon(star(3, 17))):
         solid = to_solid(mesh, 0.3)
-        body = trimesh.Trimesh(solid.vertices, to_triangles(solid), process=False)
-        assert body.is_watertight and body.is_winding_consistent
-        assert body.volume == pytest.approx(0.3 * mesh.face_areas().sum())
+        for process in (False, True):  # True merges vertices that lie in one place
+            body = trimesh.Trimesh(solid.vertices, to_triangles(solid), process=process)
+            assert body.is_watertight and body.is_winding_consistent
+            assert body.volume == pytest.approx(0.3 * mesh.face_areas().sum(), rel=1e-5)
+
+
+def test_vertices_in_one_place__are_drawn_apart() -> None:
+    near = polygon([(0.1, 0.1), (0.9, 0.1), (0.5, 0.5), (0.9, 0.9), (0.1, 0.9), (0.5 - 2e-13, 0.5)])
+    trimesh = pytest.importorskip("trimesh", reason="trimesh is not installed (pip install trimesh)")
+    solid = to_solid(near, 0.25)
+    body = trimesh.Trimesh(solid.vertices, to_triangles(solid), process=True)
+    assert body.is_watertight and body.volume == pytest.approx(0.25 * near.face_areas().sum(), rel=1e-5)
 
 
 def test_solid_of_no_depth__is_the_flat_mesh() -> None:
@@ -102,17 +115,38 @@ def test_solid_of_no_depth__is_the_flat_mesh() -> None:
     assert not solid.vertices[:, 2].any()
 
 
-@pytest.mark.parametrize("depth", [-0.1, float("nan"), float("inf")])
+@pytest.mark.parametrize("depth", [-0.1, float("nan"), float("inf"), 1e7])
 def test_solid__refuses_a_depth_that_is_none(depth: float) -> None:
     with pytest.raises(ConfigError, match=r"depth .*: expected 0 \(flat\) or more"):
         to_solid(QUAD, depth)
 
 
-def test_solid_obj__lists_n_gons() -> None:
+def test_solid_obj__lists_quads() -> None:
     lines = to_solid_obj(QUAD, 0.5).splitlines()
     assert lines[0] == "# AutoPoly: solid of depth 0.5, 8 vertices, 6 faces"
     assert lines[1] == "v 0.25 0.875 0.0" and lines[5] == "v 0.25 0.875 -0.5"
     assert lines[9:] == ["f 1 4 3 2", "f 5 6 7 8", "f 1 2 6 5", "f 2 3 7 6", "f 3 4 8 7", "f 4 1 5 8"]
+
+
+ELL = [(0.1, 0.1), (0.4, 0.1), (0.4, 0.5), (0.9, 0.5), (0.9, 0.9), (0.1, 0.9)]
+ARROW = [(0.5, 0.1), (0.9, 0.9), (0.5, 0.6), (0.1, 0.9)]  # four corners, one of them reflex
+
+
+@pytest.mark.parametrize(("outline", "n_quads"), [(ELL, 6), (ARROW, 4)])
+def test_solid_obj__has_triangles_where_quads_do_not_do(outline: list[tuple[float, float]], n_quads: int) -> None:
+    def sides(text: str) -> Counter[int]:
+        return Counter(len(line.split()) - 1 for line in text.splitlines() if line.startswith("f "))
+
+    mesh, n_cut = polygon(outline), 2 * (len(outline) - 2)
+    assert sides(to_solid_obj(mesh, 0.5)) == {4: n_quads, 3: n_cut}
+    assert sides(to_solid_obj(mesh, 0.5, triangles=True)) == {3: n_cut + 2 * n_quads}
+
+
+def test_concave__is_a_face_with_a_corner_that_turns_back() -> None:
+    square = [(0, 0), (1, 0), (1, 1), (0, 1)]
+    straight = [(0, 0), (0.3, 0), (1, 0), (1, 1), (0, 1)]
+    assert not any(is_concave(ring[::way]) for ring in (square, straight) for way in (1, -1))
+    assert all(is_concave(ring[::way]) for ring in (ELL, ARROW) for way in (1, -1))
 
 
 # --- triangles ---
