@@ -23,6 +23,7 @@ CORNER_VOTE = 0.15  # what each corner adds to the share of its colour
 FIELD_GAIN = 0.08  # by which a field must explain more of it
 FIELD_ORDERS = (2, 3, 4, 4, 4)  # of the polynomials that are fitted one after the other
 BLOCK = 2**13  # pixels whose distances are taken at a time
+ROWS = 512  # of a product: BLAS starts no threads for so few
 MOST_POINTS = 4096  # of the border that are looked at
 
 Frame = tuple[int, int, int, int]  # pixels at the top, bottom, left, right
@@ -51,24 +52,20 @@ class Background:
 
     def distances(self, features: Float32Array) -> Float32Array:
         """How far (H, W) every pixel is from the background."""
-        if self.field is None:
-            return _distances_from(self.colour, features)
-        squares = np.zeros(features.shape[:2], dtype=np.float32)
-        for channel in range(features.shape[2]):
-            squares += np.square(features[..., channel] - _evaluated(self.field[channel], features.shape))
-        distances: Float32Array = np.sqrt(squares, out=squares)
+        height, width, n_channels = features.shape
+        distances = np.empty((height, width), dtype=np.float32)
+        n_rows = max(1, BLOCK // width)
+        powers = _powers(height).T.astype(np.float32)
+        terms = None if self.field is None else (self.field.swapaxes(1, 2) @ _powers(width)).astype(np.float32)
+        for top in range(0, height, n_rows):  # so few rows stay in the cache, and BLAS starts no threads for them
+            rows = slice(top, top + n_rows)
+            squares = distances[rows]
+            squares[:] = 0
+            for channel in range(n_channels):
+                expected = self.colour[channel] if terms is None else powers[rows] @ terms[channel]
+                squares += np.square(features[rows, :, channel] - expected)
+            np.sqrt(squares, out=squares)
         return distances
-
-
-def _distances_from(colour: Float32Array, features: Float32Array) -> Float32Array:
-    """How far (H, W) every pixel is from a colour; some rows at a time, so that they stay in the cache."""
-    height, width, _ = features.shape
-    distances = np.empty((height, width), dtype=np.float32)
-    n_rows = max(1, BLOCK // width)
-    for top in range(0, height, n_rows):
-        apart = features[top : top + n_rows] - colour
-        np.sqrt(np.einsum("hwc,hwc->hw", apart, apart), out=distances[top : top + n_rows])
-    return distances
 
 
 def find_background(features: Float32Array) -> Background:
@@ -143,9 +140,9 @@ def dominant(points: Float32Array, corners: Float32Array | None = None) -> tuple
     What lies within FLAT counts twice, and the corners (4, C) have a vote beside that. Of two that as many points have,
     the lighter one.
     """
-    cells = np.floor(points / FLAT).astype(np.int64)
-    _, first, inverse, counts = np.unique(cells, axis=0, return_index=True, return_inverse=True, return_counts=True)
-    inverse = inverse.reshape(-1)
+    cells = np.floor(points / FLAT).astype(np.int64) + 2**15
+    codes = cells @ 2 ** (16 * np.arange(cells.shape[1])[::-1])  # one number for each is quicker to sort
+    _, first, inverse, counts = np.unique(codes, return_index=True, return_inverse=True, return_counts=True)
     best: tuple[float, float] = (-1.0, 0.0)
     colour, best_share = points[0], 0.0
     tried: list[int] = []
@@ -182,7 +179,7 @@ def _fading(features: Float32Array) -> Background | None:
 
     height, width, n_channels = features.shape
     step = max(1, max(height, width) // STUDIED)
-    small = features[::step, ::step]
+    small = np.ascontiguousarray(features[::step, ::step])
     basis = _basis(small.shape)
     is_border = np.zeros(small.shape[:2], dtype=bool)
     is_border[[0, -1]] = is_border[:, [0, -1]] = True
@@ -223,15 +220,6 @@ def _powers(size: int) -> FloatArray:
     return np.linspace(-1.0, 1.0, size) ** np.arange(5)[:, None]
 
 
-def _evaluated(field: FloatArray, shape: tuple[int, ...]) -> Float32Array:
-    """The field (5, 5) on a picture (H, W): (H, W)."""
-    rows, columns = _powers(shape[0]).astype(np.float32), _powers(shape[1])
-    values = np.zeros(shape[:2], dtype=np.float32)
-    for row, coefficients in zip(rows, field.T, strict=True):  # BLAS would start threads for it
-        values += row[:, None] * (coefficients[:, None] * columns).sum(axis=0).astype(np.float32)
-    return values
-
-
 def _terms(order: int) -> AnyArray:
     """Which of the 25 terms a polynomial of that order has."""
     return np.flatnonzero(np.add.outer(np.arange(5), np.arange(5)).ravel() <= order)
@@ -240,36 +228,42 @@ def _terms(order: int) -> AnyArray:
 def _fit(basis: FloatArray, features: Float32Array, chosen: BoolArray, order: int) -> FloatArray:
     """Least squares over the chosen pixels: coefficients (C, 25)."""
     terms = _terms(order)
-    return _solved(basis[chosen][:, terms], features[chosen], 1.0, terms)
+    return _solved(basis[chosen].take(terms, axis=1), features[chosen], None, terms)
 
 
 def _robust_fit(basis: FloatArray, features: Float32Array, chosen: BoolArray, order: int) -> FloatArray:
     """The same, in which pixels that are far off count less (least absolute deviations, reweighted)."""
     terms = _terms(order)
     rows, values = basis[chosen][:, terms], features[chosen]
-    coefficients = _solved(rows, values, 1.0, terms)
+    coefficients = _solved(rows, values, None, terms)
     for _ in range(12):
         off = np.linalg.norm(values - _product(rows, coefficients[:, terms]), axis=1)
         coefficients = _solved(rows, values, 1.0 / np.maximum(off, 0.005), terms)
     return coefficients
 
 
-def _solved(rows: FloatArray, values: Float32Array, weights: FloatArray | float, terms: AnyArray) -> FloatArray:
-    """The normal equations of rows (N, T) and values (N, C), solved: (C, 25). einsum, for BLAS starts threads."""
-    weighted = (rows.T * weights).T
-    normal = np.einsum("nt,nu->tu", weighted, rows) + 1e-9 * len(rows) * np.eye(len(terms))
+def _solved(rows: FloatArray, values: Float32Array, weights: FloatArray | None, terms: AnyArray) -> FloatArray:
+    """The normal equations of rows (N, T) and values (N, C), solved: (C, 25)."""
+    n_terms = len(terms)
+    columns = np.concatenate([rows, values], axis=1)
+    weighted = rows if weights is None else rows * weights[:, None]
+    sums = np.zeros((n_terms, columns.shape[1]))
+    for start in range(0, len(rows), ROWS):
+        sums += weighted[start : start + ROWS].T @ columns[start : start + ROWS]
+    normal = sums[:, :n_terms] + 1e-9 * len(rows) * np.eye(n_terms)
     coefficients = np.zeros((values.shape[1], 25))
-    coefficients[:, terms] = np.linalg.solve(normal, np.einsum("nt,nc->tc", weighted, values)).T
+    coefficients[:, terms] = np.linalg.solve(normal, sums[:, n_terms:]).T
     return coefficients
 
 
 def _product(basis: FloatArray, coefficients: FloatArray) -> FloatArray:
     """The polynomials (C, T) at every pixel (..., T): (..., C)."""
-    return np.einsum("...t,ct->...c", basis, coefficients)
+    return basis @ coefficients.T
 
 
 def _residual(basis: FloatArray, features: Float32Array, coefficients: FloatArray) -> AnyArray:
-    return np.linalg.norm(features - _product(basis, coefficients), axis=2)
+    apart = features - _product(basis, coefficients)
+    return np.sqrt(np.einsum("hwc,hwc->hw", apart, apart))
 
 
 def _thinned(points: AnyArray) -> AnyArray:

@@ -10,7 +10,7 @@ from autopoly_env.silhouette.background import NO_FRAME, Frame, border, find_fra
 from autopoly_env.silhouette.colours import hex_of
 from autopoly_env.silhouette.inside_out import righted
 from autopoly_env.silhouette.loading import Picture
-from autopoly_env.silhouette.opinion import Opinion, View, disagreement, view_of
+from autopoly_env.silhouette.opinion import Opinion, View, are_alike, view_of
 from autopoly_env.silhouette.options import DEFAULT_OPTIONS, ObjectOptions
 
 AGREED = 0.03  # of the object: opinions that differ by less are one
@@ -140,10 +140,10 @@ def _chosen(view: View) -> Opinion | None:
     lightness = by_lightness.split(view) if np.ptp(view.levels) > 0 else None
     if colour is None or lightness is None:
         return colour or lightness
-    apart = disagreement(colour.mask, lightness.mask)
-    if apart <= AGREED and not lightness.is_clear and (colour.is_clear or colour.support >= TRUSTED):
+    agreed = are_alike(colour.mask, lightness.mask, AGREED)
+    if agreed and not lightness.is_clear and (colour.is_clear or colour.support >= TRUSTED):
         return colour.saying(*colour.remarks)
-    if apart <= AGREED:
+    if agreed:
         warnings = [remark for remark in colour.remarks if remark.startswith("warning")]
         return Opinion(lightness.mask, (*lightness.notes, *warnings), max(colour.support, lightness.support))
     if colour.is_clear or colour.support >= (lightness.support if lightness.is_clear else TRUSTED):

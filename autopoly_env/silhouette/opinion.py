@@ -66,12 +66,14 @@ class Opinion:
         return replace(self, notes=(*self.notes, *words))
 
 
-def disagreement(one: BoolArray, other: BoolArray) -> float:
-    """The share of the larger object in which two masks differ, but for the pixel along a common outline."""
+def are_alike(one: BoolArray, other: BoolArray, most: float) -> bool:
+    """Whether masks differ by at most a share of the larger object, but for the pixel along a common outline."""
     differs = one ^ other
-    if not differs.any():
-        return 0.0
-    return float((differs & ~(_beside(one & other) & _beside(~(one | other)))).sum() / max(one.sum(), other.sum(), 1))
+    allowed = most * max(int(np.count_nonzero(one)), int(np.count_nonzero(other)))
+    if np.count_nonzero(differs) <= allowed:
+        return True
+    along = _beside(one & other) & _beside(~(one | other))
+    return bool(np.count_nonzero(differs & ~along) <= allowed)
 
 
 def _beside(mask: BoolArray) -> BoolArray:
