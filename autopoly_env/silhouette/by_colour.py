@@ -6,7 +6,7 @@ from autopoly_env.arrays import BoolArray, Float32Array
 from autopoly_env.errors import SilhouetteError
 from autopoly_env.silhouette.background import Background, find_background
 from autopoly_env.silhouette.colours import hex_of, oklab, parse_colour
-from autopoly_env.silhouette.difference import STUDIED, beyond_cut, choose_cut
+from autopoly_env.silhouette.difference import STUDIED, beyond_cut, choose_cut, filled
 from autopoly_env.silhouette.opinion import Opinion, View
 from autopoly_env.silhouette.options import ObjectOptions
 
@@ -45,11 +45,9 @@ def opinion(view: View) -> Opinion | None:
 
 def _enclosed_share(mask: BoolArray) -> float:
     """The share of holes in what the outline encloses, judged on about STUDIED pixels a side."""
-    from scipy.ndimage import binary_fill_holes
-
     step = max(1, max(mask.shape) // STUDIED)
     small = mask[::step, ::step]
-    return 1.0 - float(small.sum()) / max(1, int(binary_fill_holes(small).sum()))
+    return 1.0 - float(small.sum()) / max(1, int(filled(small).sum()))
 
 
 def asked(label: str, view: View, options: ObjectOptions) -> Opinion:

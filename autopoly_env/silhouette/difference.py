@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from autopoly_env.arrays import BoolArray, Float32Array
-from autopoly_env.silhouette.background import Background
+from autopoly_env.silhouette.background import Background, border
 
 LEAST = 0.012  # no smaller difference is told from none
 USUAL = 0.07  # from here on something is there, if nothing speaks against it
@@ -72,9 +72,10 @@ def beyond_cut(distances: Float32Array, level: float) -> BoolArray:
     mask: BoolArray = distances > level
     height, width = mask.shape
     for _ in range(PEELED):
-        rows, columns = np.nonzero(_outermost(mask))
-        if not len(rows):
+        places = np.flatnonzero(_outermost(mask))  # much quicker than np.nonzero
+        if not len(places):
             break
+        rows, columns = np.divmod(places, width)
         strongest = distances[rows, columns]
         for down in range(-2, 3):
             for right in range(-2, 3):
@@ -97,12 +98,20 @@ def _outermost(mask: BoolArray) -> BoolArray:
     return mask & ~inside
 
 
+def filled(mask: BoolArray) -> BoolArray:
+    """The mask (H, W) and its holes."""
+    from skimage.measure import label
+
+    labels = label(~mask, connectivity=1)
+    outside = np.zeros(int(labels.max()) + 1, dtype=bool)
+    outside[border(labels)] = True
+    outside[0] = False
+    return ~outside[labels]
+
+
 def _softness(distances: Float32Array, level: float) -> tuple[float, float]:
     """How many pixels (of 256 a side) an outline gives way, on average, if the cut is a quarter lower; the limit."""
-    from scipy.ndimage import binary_fill_holes
-
-    outline = binary_fill_holes(distances > level)
-    wider = binary_fill_holes(distances > 0.75 * level)
+    outline, wider = filled(distances > level), filled(distances > 0.75 * level)
     length = int(_outermost(outline).sum())
     if not length:
         return (0.0 if outline.all() else np.inf), SOFT
