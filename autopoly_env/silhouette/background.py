@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from autopoly_env.arrays import AnyArray, BoolArray, Float32Array, FloatArray
+from autopoly_env.arrays import AnyArray, BoolArray, Float32Array, FloatArray, IntArray
 
 # Distances are those of Oklab: 1 between black and white; what people just notice is about 0.01 to 0.02.
 SAME = 0.06  # colours this close are one
@@ -18,6 +18,7 @@ FLAT, FLAT_SHARE = 0.01, 0.3  # nor where so much of it is of one colour to the 
 DRIFTING, SMOOTH = 0.2, 0.8  # but not if so much of the border is nearly of that colour, in steps that are so smooth
 STEP, LEVELS = 0.004, 4  # and on so many levels: then the light fades a little
 FLAT_SUPPORT = 0.9  # of what is that flat: an object may hide the rest of the border
+LETTER, LETTER_SHARE = 0.002, 0.8  # so much of what is flat is that very colour in a drawing, whose edges are the rest
 CANDIDATES = 5  # colours of the border that may be the background's
 CORNER_VOTE = 0.15  # what each corner adds to the share of its colour
 FIELD_GAIN = 0.08  # by which a field must explain more of it
@@ -67,6 +68,15 @@ class Background:
             np.sqrt(squares, out=squares)
         return distances
 
+    def differences(self, features: Float32Array, rows: IntArray, columns: IntArray) -> Float32Array:
+        """How, by feature, the pixels at N rows and columns differ from it: (N, C)."""
+        if self.field is None:
+            return features[rows, columns] - self.colour
+        height, width, _ = features.shape
+        down, right = _powers(height)[:, rows], _powers(width)[:, columns]
+        expected = np.einsum("cij,in,jn->nc", self.field, right, down, optimize=True)
+        return (features[rows, columns] - expected).astype(np.float32)
+
 
 def find_background(features: Float32Array) -> Background:
     """The background (H, W, C), judged by the border: by what most of it looks like."""
@@ -74,7 +84,10 @@ def find_background(features: Float32Array) -> Background:
     colour, share = dominant(points, features[[0, 0, -1, -1], [0, -1, 0, -1]])
     residuals = np.linalg.norm(points - colour, axis=1)
     is_flat = float((residuals < FLAT).mean()) >= FLAT_SHARE and not _fades_a_little(features, colour)
-    noise = _noise(residuals[residuals < FLAT] if is_flat else residuals)
+    near = residuals[residuals < FLAT]
+    noise = _noise(near if is_flat else residuals)
+    if is_flat and float((near < LETTER).mean()) >= LETTER_SHARE:
+        noise = LETTER
     found = Background(colour, None, share, noise, is_flat)
     if share >= EVEN_ENOUGH or is_flat or min(features.shape[:2]) < 16:
         return found
@@ -90,8 +103,9 @@ def _fades_a_little(features: Float32Array, colour: Float32Array) -> bool:
     if near.mean() < DRIFTING:
         return False
     steps = np.abs(np.diff(away))[near[1:]]
-    n_levels = int((np.bincount((away[near] / STEP).astype(int)) >= 0.05 * near.sum()).sum())
-    return bool((steps < FLAT).mean() >= SMOOTH and n_levels >= LEVELS)
+    shares = np.bincount((away[near] / STEP).astype(int)) / near.sum()
+    is_one_colour = shares.max() >= 0.5  # that of something pale on the border
+    return bool((steps < FLAT).mean() >= SMOOTH and (shares >= 0.05).sum() >= LEVELS and not is_one_colour)
 
 
 def find_frame(features: Float32Array) -> Frame:

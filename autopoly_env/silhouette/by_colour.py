@@ -23,7 +23,7 @@ def opinion(view: View) -> Opinion | None:
     cut = choose_cut(distances, background)
     if cut is None:
         return None
-    mask = beyond_cut(distances, cut.level)
+    mask = beyond_cut(view.features, distances, background, cut.level)
     if not mask.any() or mask.all():
         return None
     support = background.support * (1.0 if cut.is_sharp else BLURRED)
@@ -65,7 +65,9 @@ def asked(label: str, view: View, options: ObjectOptions) -> Opinion:
         distances = background.distances(view.features)
         cut = choose_cut(distances, background) if given is None else None
         level = given if given is not None else cut.level if cut is not None else 0.0
-        mask = beyond_cut(distances, level) if given is None else distances > level
+        mask = distances > level
+        if given is None:
+            mask = beyond_cut(view.features, distances, background, level)
         return Opinion(mask, (f"object is what differs from {options.background} by more than {level:.2f}",), 1.0)
     near = _distances(view, options.object_colour)
     if given is not None:

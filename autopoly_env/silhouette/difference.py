@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from autopoly_env.arrays import BoolArray, Float32Array
+from autopoly_env.arrays import BoolArray, Float32Array, IntArray
 from autopoly_env.silhouette.background import Background, border
 
 LEAST = 0.012  # no smaller difference is told from none
@@ -18,6 +18,9 @@ HIGHEST = 0.65  # of the strongest difference: no higher cut is tried
 SOFT = 0.35  # pixels (of 256 a side) that an outline may give way when the cut is lowered by a quarter
 SHARP = 0.45  # the same in pixels of its own, of a picture so small that these are larger
 PEELED = 2  # pixels of a soft edge that are taken off at most
+HALF = 0.5  # covered: a pixel of the edge is object from here on
+SPRITE = 200  # pixels a side: the edges of smaller pictures are one pixel wide, and so are the things in them
+ASTRAY, ASTRAY_SHARE = 0.03, 0.1  # so far, and by so much of itself, a mixture may be from the line between two colours
 
 
 @dataclass(frozen=True)
@@ -67,25 +70,50 @@ def _is_dusty(distances: Float32Array, noise: float, level: float) -> bool:
     return int(faint) - int(usual) > DUST
 
 
-def beyond_cut(distances: Float32Array, level: float) -> BoolArray:
-    """The mask (H, W) of what lies beyond the cut, its antialiased edge cut where it is half as different as inside."""
+def beyond_cut(features: Float32Array, distances: Float32Array, background: Background, level: float) -> BoolArray:
+    """The mask (H, W) of what lies beyond the cut, its antialiased edge cut where it is half covered.
+
+    A pixel of the edge shows less than half of the object where one beside it differs from the background more than twice
+    as much. In a sprite, in which things are a few pixels wide, it has to be a mixture of that one and the background, too.
+    """
     mask: BoolArray = distances > level
     height, width = mask.shape
+    is_sprite = max(mask.shape) < SPRITE
+    reach = 1 if is_sprite else 2
     for _ in range(PEELED):
-        places = np.flatnonzero(_outermost(mask))  # much quicker than np.nonzero
-        if not len(places):
-            break
-        rows, columns = np.divmod(places, width)
-        strongest = distances[rows, columns]
-        for down in range(-2, 3):
-            for right in range(-2, 3):
-                beside = (np.clip(rows + down, 0, height - 1), np.clip(columns + right, 0, width - 1))
-                strongest = np.maximum(strongest, distances[beside])
-        soft = distances[rows, columns] < 0.5 * strongest
+        rows, columns = np.divmod(np.flatnonzero(_outermost(mask)), width)  # much quicker than np.nonzero
+        beside = [
+            (np.clip(rows + down, 0, height - 1), np.clip(columns + right, 0, width - 1))
+            for down in range(-reach, reach + 1)
+            for right in range(-reach, reach + 1)
+        ]
+        own = distances[rows, columns]
+        soft = own < HALF * np.max([distances[place] for place in beside], axis=0, initial=0.0)
+        if is_sprite:
+            beside = [(down[soft], right[soft]) for down, right in beside]
+            soft[soft] = _are_mixtures(features, distances, background, (rows[soft], columns[soft]), beside)
         if not soft.any():
             break
         mask[rows[soft], columns[soft]] = False
     return mask
+
+
+Places = tuple[IntArray, IntArray]  # rows and columns of N pixels
+
+
+def _are_mixtures(
+    features: Float32Array, distances: Float32Array, background: Background, places: Places, beside: list[Places]
+) -> BoolArray:
+    """Which pixels (N,) are less than half as different as one beside them, in the same direction."""
+    own, apart = distances[places], background.differences(features, *places)
+    found = np.zeros(len(own), dtype=bool)
+    for place in beside:
+        strong = distances[place]
+        direction = background.differences(features, *place) / np.maximum(strong, LEAST)[:, None]
+        along = np.einsum("nc,nc->n", apart, direction)
+        astray = np.sqrt(np.maximum(own**2 - along**2, 0.0))
+        found |= (own < HALF * strong) & (along > 0) & (astray < ASTRAY + ASTRAY_SHARE * own)
+    return found
 
 
 def _outermost(mask: BoolArray) -> BoolArray:
