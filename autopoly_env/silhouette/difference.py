@@ -73,8 +73,8 @@ def _is_dusty(distances: Float32Array, noise: float, level: float) -> bool:
 def beyond_cut(features: Float32Array, distances: Float32Array, background: Background, level: float) -> BoolArray:
     """The mask (H, W) of what lies beyond the cut, its antialiased edge cut where it is half covered.
 
-    A pixel of the edge shows less than half of the object where one beside it differs from the background more than twice
-    as much. In a sprite, in which things are a few pixels wide, it has to be a mixture of that one and the background, too.
+    A pixel of the edge shows less than half of the object where one beside it is more than twice as different. In a
+    sprite, in which things are a few pixels wide, it has to be a mixture of that one and the background, too.
     """
     mask: BoolArray = distances > level
     height, width = mask.shape
