@@ -17,8 +17,10 @@ EVEN_ENOUGH = 0.85  # share of the border that one colour explains: no field is 
 FLAT, FLAT_SHARE = 0.01, 0.3  # nor where so much of it is of one colour to the letter, as in drawings,
 DRIFTING, SMOOTH = 0.2, 0.8  # but not if so much of the border is nearly of that colour, in steps that are so smooth
 STEP, LEVELS = 0.004, 4  # and on so many levels: then the light fades a little
+PALE_SHARE = 0.75  # of what is nearly of that colour has one colour of its own: something pale that touches the border
 FLAT_SUPPORT = 0.9  # of what is that flat: an object may hide the rest of the border
 LETTER, LETTER_SHARE = 0.002, 0.8  # so much of what is flat is that very colour in a drawing, whose edges are the rest
+RUN, EVEN, EVEN_SHARE = 8, 0.015, 0.6  # of runs of pixels near the colour, their middle is this close: JPEG, not light
 CANDIDATES = 5  # colours of the border that may be the background's
 CORNER_VOTE = 0.15  # what each corner adds to the share of its colour
 FIELD_GAIN = 0.08  # by which a field must explain more of it
@@ -45,11 +47,12 @@ class Background:
     share: float
     noise: float
     is_flat: bool = False
+    is_even: bool = False
 
     @property
     def support(self) -> float:
         """How sure it is that this is the background, 0 to 1."""
-        return max(self.share, FLAT_SUPPORT) if self.is_flat else self.share
+        return max(self.share, FLAT_SUPPORT) if self.is_flat or self.is_even else self.share
 
     def distances(self, features: Float32Array) -> Float32Array:
         """How far (H, W) every pixel is from the background."""
@@ -81,18 +84,32 @@ class Background:
 def find_background(features: Float32Array) -> Background:
     """The background (H, W, C), judged by the border: by what most of it looks like."""
     points = _thinned(border(features))
-    colour, share = dominant(points, features[[0, 0, -1, -1], [0, -1, 0, -1]])
+    corners = features[[0, 0, -1, -1], [0, -1, 0, -1]]
+    colour, share = dominant(points, corners)
     residuals = np.linalg.norm(points - colour, axis=1)
     is_flat = float((residuals < FLAT).mean()) >= FLAT_SHARE and not _fades_a_little(features, colour)
     near = residuals[residuals < FLAT]
     noise = _noise(near if is_flat else residuals)
     if is_flat and float((near < LETTER).mean()) >= LETTER_SHARE:
         noise = LETTER
-    found = Background(colour, None, share, noise, is_flat)
-    if share >= EVEN_ENOUGH or is_flat or min(features.shape[:2]) < 16:
+    is_even = not is_flat and _is_even(features, colour)
+    found = Background(colour, None, share, noise, is_flat, is_even)
+    if share >= EVEN_ENOUGH or is_flat or is_even or min(features.shape[:2]) < 16:
         return found
     fading = _fading(features)
     return found if fading is None or fading.share < share + FIELD_GAIN else fading
+
+
+def _is_even(features: Float32Array, colour: Float32Array) -> bool:
+    """Whether three corners and much of the border are of a colour, but for noise: it does not drift off from it."""
+    corners = features[[0, 0, -1, -1], [0, -1, 0, -1]]
+    if (np.linalg.norm(corners - colour, axis=1) < SAME).sum() < 3:
+        return False
+    sides = (features[0], features[-1], features[:, 0], features[:, -1])
+    runs = np.concatenate([side[: len(side) // RUN * RUN].reshape(-1, RUN, side.shape[1]) for side in sides])
+    away = np.linalg.norm(np.median(runs, axis=1) - colour, axis=1)
+    n_close = int((away < EVEN).sum())
+    return n_close >= FLAT_SHARE * len(runs) and n_close >= EVEN_SHARE * int((away < SAME).sum())
 
 
 def _fades_a_little(features: Float32Array, colour: Float32Array) -> bool:
@@ -104,7 +121,7 @@ def _fades_a_little(features: Float32Array, colour: Float32Array) -> bool:
         return False
     steps = np.abs(np.diff(away))[near[1:]]
     shares = np.bincount((away[near] / STEP).astype(int)) / near.sum()
-    is_one_colour = shares.max() >= 0.5  # that of something pale on the border
+    is_one_colour = shares.max() >= PALE_SHARE
     return bool((steps < FLAT).mean() >= SMOOTH and (shares >= 0.05).sum() >= LEVELS and not is_one_colour)
 
 

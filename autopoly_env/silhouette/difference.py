@@ -9,6 +9,7 @@ from autopoly_env.silhouette.background import Background, border
 
 LEAST = 0.012  # no smaller difference is told from none
 USUAL = 0.07  # from here on something is there, if nothing speaks against it
+FAINT = 0.03  # what lossy compression leaves beside edges is less, mostly
 EXACT = 0.004  # a flat background with no more noise is a drawing's: whatever differs from it at all is there
 DUST = 3  # more parts at the lowest cut than at the usual one: it is no drawing, but a JPEG of one
 PALE = 0.35  # of the strongest difference: a paler object has a lower cut
@@ -48,8 +49,8 @@ def choose_cut(distances: Float32Array, background: Background) -> Cut | None:
         return None
     strongest = float(np.quantile(beyond, 0.9))
     level = max(noise, min(USUAL, PALE * strongest))
-    if background.is_flat and background.noise <= EXACT and not _is_dusty(small, noise, level):
-        level = noise
+    if background.is_flat:
+        level = _lowest(small, noise if background.noise <= EXACT else max(noise, FAINT), level)
     best: Cut | None = None
     while best is None or level <= HIGHEST * strongest:
         softness, limit = _softness(small, level)
@@ -60,6 +61,16 @@ def choose_cut(distances: Float32Array, background: Background) -> Cut | None:
             best = cut
         level *= STEP
     return best
+
+
+def _lowest(distances: Float32Array, faint: float, usual: float) -> float:
+    """The lowest cut from a faint one to the usual one, at which there is no dust and the outline is sharp."""
+    while faint < usual:
+        softness, limit = _softness(distances, faint)
+        if softness <= limit and not _is_dusty(distances, faint, usual):
+            return faint
+        faint *= STEP
+    return usual
 
 
 def _is_dusty(distances: Float32Array, noise: float, level: float) -> bool:
