@@ -40,8 +40,8 @@ def opinion(view: View) -> Opinion | None:
     if enclosed > HOLLOW:
         words = f"{enclosed:.0%} of what its outline encloses looks like the background"
         remarks.append(f"{words}: --background '{name}' --threshold {LOWERED} takes more of it")
-    is_clear = background.is_flat or (background.is_even and cut.is_sharp)
-    return Opinion(mask, tuple(notes), support, tuple(remarks), name, is_clear)
+    is_even = background.is_even and cut.is_sharp
+    return Opinion(mask, tuple(notes), support, tuple(remarks), name, background.is_flat, is_even)
 
 
 def _enclosed_share(mask: BoolArray) -> float:

@@ -15,6 +15,9 @@ from autopoly_env.silhouette.options import DEFAULT_OPTIONS, ObjectOptions
 
 AGREED = 0.03  # of the object: opinions that differ by less are one
 TRUSTED = 0.6  # support from which the colour of the border is believed to be that of the background
+UNSEEN = (
+    0.5  # of what differs in colour from a noisy background: if lightness finds no more, it does not see the object
+)
 ADVICE = "expected an object that differs from its background"
 TILE = 0.8  # of its extent: what is opaque is a tile, on which something may be drawn
 NOISE_LEVELS, NOISE_SIDE, NOISE_BAND = 3, 24, (0.85, 1.15)  # see `_is_noise`
@@ -146,7 +149,8 @@ def _chosen(view: View) -> Opinion | None:
     if agreed:
         warnings = [remark for remark in colour.remarks if remark.startswith("warning")]
         return Opinion(lightness.mask, (*lightness.notes, *warnings), max(colour.support, lightness.support))
-    if colour.is_clear or colour.support >= (lightness.support if lightness.is_clear else TRUSTED):
+    unseen = colour.is_even and np.count_nonzero(lightness.mask) < UNSEEN * np.count_nonzero(colour.mask)
+    if colour.is_clear or unseen or colour.support >= (lightness.support if lightness.is_clear else TRUSTED):
         other = "light" if "lighter" in lightness.notes[1] else "dark"
         share = f"{_share(lightness.mask, colour.mask)} of this: --object {other}"
         return colour.saying(*colour.remarks, f"lightness alone would find another object, {share}")

@@ -51,7 +51,8 @@ class Opinion:
     """A mask (H, W) of the object, how it came about, and how well the picture supports it, 0 to 1.
 
     `remarks` are what is said beside `notes` only where another opinion is worth a word; `colour` is the background's;
-    `is_clear` says that the background is flat, or that a picture has but two levels of grey.
+    `is_clear` says that the background is flat, or that a picture has but two levels of grey; `is_even` that the
+    background is flat but for noise.
     """
 
     mask: BoolArray
@@ -60,6 +61,7 @@ class Opinion:
     remarks: tuple[str, ...] = ()
     colour: str = ""
     is_clear: bool = False
+    is_even: bool = False
 
     def saying(self, *words: str) -> "Opinion":
         """The same with more notes."""
