@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from autopoly_env.arrays import AnyArray, BoolArray, Float32Array, FloatArray
+from autopoly_env.arrays import AnyArray, BoolArray, Float32Array, FloatArray, IntArray
 
 # Distances are those of Oklab: 1 between black and white; what people just notice is about 0.01 to 0.02.
 SAME = 0.06  # colours this close are one
@@ -17,12 +17,16 @@ EVEN_ENOUGH = 0.85  # share of the border that one colour explains: no field is 
 FLAT, FLAT_SHARE = 0.01, 0.3  # nor where so much of it is of one colour to the letter, as in drawings,
 DRIFTING, SMOOTH = 0.2, 0.8  # but not if so much of the border is nearly of that colour, in steps that are so smooth
 STEP, LEVELS = 0.004, 4  # and on so many levels: then the light fades a little
+PALE_SHARE = 0.75  # of what is nearly of that colour has one colour of its own: something pale that touches the border
 FLAT_SUPPORT = 0.9  # of what is that flat: an object may hide the rest of the border
+LETTER, LETTER_SHARE = 0.002, 0.8  # so much of what is flat is that very colour in a drawing, whose edges are the rest
+RUN, EVEN, EVEN_SHARE = 8, 0.015, 0.6  # of runs of pixels near the colour, their middle is this close: JPEG, not light
 CANDIDATES = 5  # colours of the border that may be the background's
 CORNER_VOTE = 0.15  # what each corner adds to the share of its colour
 FIELD_GAIN = 0.08  # by which a field must explain more of it
 FIELD_ORDERS = (2, 3, 4, 4, 4)  # of the polynomials that are fitted one after the other
 BLOCK = 2**13  # pixels whose distances are taken at a time
+ROWS = 512  # of a product: BLAS starts no threads for so few
 MOST_POINTS = 4096  # of the border that are looked at
 
 Frame = tuple[int, int, int, int]  # pixels at the top, bottom, left, right
@@ -43,46 +47,69 @@ class Background:
     share: float
     noise: float
     is_flat: bool = False
+    is_even: bool = False
 
     @property
     def support(self) -> float:
         """How sure it is that this is the background, 0 to 1."""
-        return max(self.share, FLAT_SUPPORT) if self.is_flat else self.share
+        return max(self.share, FLAT_SUPPORT) if self.is_flat or self.is_even else self.share
 
     def distances(self, features: Float32Array) -> Float32Array:
         """How far (H, W) every pixel is from the background."""
-        if self.field is None:
-            return _distances_from(self.colour, features)
-        squares = np.zeros(features.shape[:2], dtype=np.float32)
-        for channel in range(features.shape[2]):
-            squares += np.square(features[..., channel] - _evaluated(self.field[channel], features.shape))
-        distances: Float32Array = np.sqrt(squares, out=squares)
+        height, width, n_channels = features.shape
+        distances = np.empty((height, width), dtype=np.float32)
+        n_rows = max(1, BLOCK // width)
+        powers = _powers(height).T.astype(np.float32)
+        terms = None if self.field is None else (self.field.swapaxes(1, 2) @ _powers(width)).astype(np.float32)
+        for top in range(0, height, n_rows):  # so few rows stay in the cache, and BLAS starts no threads for them
+            rows = slice(top, top + n_rows)
+            squares = distances[rows]
+            squares[:] = 0
+            for channel in range(n_channels):
+                expected = self.colour[channel] if terms is None else powers[rows] @ terms[channel]
+                squares += np.square(features[rows, :, channel] - expected)
+            np.sqrt(squares, out=squares)
         return distances
 
-
-def _distances_from(colour: Float32Array, features: Float32Array) -> Float32Array:
-    """How far (H, W) every pixel is from a colour; some rows at a time, so that they stay in the cache."""
-    height, width, _ = features.shape
-    distances = np.empty((height, width), dtype=np.float32)
-    n_rows = max(1, BLOCK // width)
-    for top in range(0, height, n_rows):
-        apart = features[top : top + n_rows] - colour
-        np.sqrt(np.einsum("hwc,hwc->hw", apart, apart), out=distances[top : top + n_rows])
-    return distances
+    def differences(self, features: Float32Array, rows: IntArray, columns: IntArray) -> Float32Array:
+        """How, by feature, the pixels at N rows and columns differ from it: (N, C)."""
+        if self.field is None:
+            return features[rows, columns] - self.colour
+        height, width, _ = features.shape
+        down, right = _powers(height)[:, rows], _powers(width)[:, columns]
+        expected = np.einsum("cij,in,jn->nc", self.field, right, down, optimize=True)
+        return (features[rows, columns] - expected).astype(np.float32)
 
 
 def find_background(features: Float32Array) -> Background:
     """The background (H, W, C), judged by the border: by what most of it looks like."""
     points = _thinned(border(features))
-    colour, share = dominant(points, features[[0, 0, -1, -1], [0, -1, 0, -1]])
+    corners = features[[0, 0, -1, -1], [0, -1, 0, -1]]
+    colour, share = dominant(points, corners)
     residuals = np.linalg.norm(points - colour, axis=1)
     is_flat = float((residuals < FLAT).mean()) >= FLAT_SHARE and not _fades_a_little(features, colour)
-    noise = _noise(residuals[residuals < FLAT] if is_flat else residuals)
-    found = Background(colour, None, share, noise, is_flat)
-    if share >= EVEN_ENOUGH or is_flat or min(features.shape[:2]) < 16:
+    near = residuals[residuals < FLAT]
+    noise = _noise(near if is_flat else residuals)
+    if is_flat and float((near < LETTER).mean()) >= LETTER_SHARE:
+        noise = LETTER
+    is_even = not is_flat and _is_even(features, colour)
+    found = Background(colour, None, share, noise, is_flat, is_even)
+    if share >= EVEN_ENOUGH or is_flat or is_even or min(features.shape[:2]) < 16:
         return found
     fading = _fading(features)
     return found if fading is None or fading.share < share + FIELD_GAIN else fading
+
+
+def _is_even(features: Float32Array, colour: Float32Array) -> bool:
+    """Whether three corners and much of the border are of a colour, but for noise: it does not drift off from it."""
+    corners = features[[0, 0, -1, -1], [0, -1, 0, -1]]
+    if (np.linalg.norm(corners - colour, axis=1) < SAME).sum() < 3:
+        return False
+    sides = (features[0], features[-1], features[:, 0], features[:, -1])
+    runs = np.concatenate([side[: len(side) // RUN * RUN].reshape(-1, RUN, side.shape[1]) for side in sides])
+    away = np.linalg.norm(np.median(runs, axis=1) - colour, axis=1)
+    n_close = int((away < EVEN).sum())
+    return n_close >= FLAT_SHARE * len(runs) and n_close >= EVEN_SHARE * int((away < SAME).sum())
 
 
 def _fades_a_little(features: Float32Array, colour: Float32Array) -> bool:
@@ -93,8 +120,9 @@ def _fades_a_little(features: Float32Array, colour: Float32Array) -> bool:
     if near.mean() < DRIFTING:
         return False
     steps = np.abs(np.diff(away))[near[1:]]
-    n_levels = int((np.bincount((away[near] / STEP).astype(int)) >= 0.05 * near.sum()).sum())
-    return bool((steps < FLAT).mean() >= SMOOTH and n_levels >= LEVELS)
+    shares = np.bincount((away[near] / STEP).astype(int)) / near.sum()
+    is_one_colour = shares.max() >= PALE_SHARE
+    return bool((steps < FLAT).mean() >= SMOOTH and (shares >= 0.05).sum() >= LEVELS and not is_one_colour)
 
 
 def find_frame(features: Float32Array) -> Frame:
@@ -143,9 +171,9 @@ def dominant(points: Float32Array, corners: Float32Array | None = None) -> tuple
     What lies within FLAT counts twice, and the corners (4, C) have a vote beside that. Of two that as many points have,
     the lighter one.
     """
-    cells = np.floor(points / FLAT).astype(np.int64)
-    _, first, inverse, counts = np.unique(cells, axis=0, return_index=True, return_inverse=True, return_counts=True)
-    inverse = inverse.reshape(-1)
+    cells = np.floor(points / FLAT).astype(np.int64) + 2**15
+    codes = cells @ 2 ** (16 * np.arange(cells.shape[1])[::-1])  # one number for each is quicker to sort
+    _, first, inverse, counts = np.unique(codes, return_index=True, return_inverse=True, return_counts=True)
     best: tuple[float, float] = (-1.0, 0.0)
     colour, best_share = points[0], 0.0
     tried: list[int] = []
@@ -182,7 +210,7 @@ def _fading(features: Float32Array) -> Background | None:
 
     height, width, n_channels = features.shape
     step = max(1, max(height, width) // STUDIED)
-    small = features[::step, ::step]
+    small = np.ascontiguousarray(features[::step, ::step])
     basis = _basis(small.shape)
     is_border = np.zeros(small.shape[:2], dtype=bool)
     is_border[[0, -1]] = is_border[:, [0, -1]] = True
@@ -223,15 +251,6 @@ def _powers(size: int) -> FloatArray:
     return np.linspace(-1.0, 1.0, size) ** np.arange(5)[:, None]
 
 
-def _evaluated(field: FloatArray, shape: tuple[int, ...]) -> Float32Array:
-    """The field (5, 5) on a picture (H, W): (H, W)."""
-    rows, columns = _powers(shape[0]).astype(np.float32), _powers(shape[1])
-    values = np.zeros(shape[:2], dtype=np.float32)
-    for row, coefficients in zip(rows, field.T, strict=True):  # BLAS would start threads for it
-        values += row[:, None] * (coefficients[:, None] * columns).sum(axis=0).astype(np.float32)
-    return values
-
-
 def _terms(order: int) -> AnyArray:
     """Which of the 25 terms a polynomial of that order has."""
     return np.flatnonzero(np.add.outer(np.arange(5), np.arange(5)).ravel() <= order)
@@ -240,36 +259,42 @@ def _terms(order: int) -> AnyArray:
 def _fit(basis: FloatArray, features: Float32Array, chosen: BoolArray, order: int) -> FloatArray:
     """Least squares over the chosen pixels: coefficients (C, 25)."""
     terms = _terms(order)
-    return _solved(basis[chosen][:, terms], features[chosen], 1.0, terms)
+    return _solved(basis[chosen].take(terms, axis=1), features[chosen], None, terms)
 
 
 def _robust_fit(basis: FloatArray, features: Float32Array, chosen: BoolArray, order: int) -> FloatArray:
     """The same, in which pixels that are far off count less (least absolute deviations, reweighted)."""
     terms = _terms(order)
     rows, values = basis[chosen][:, terms], features[chosen]
-    coefficients = _solved(rows, values, 1.0, terms)
+    coefficients = _solved(rows, values, None, terms)
     for _ in range(12):
         off = np.linalg.norm(values - _product(rows, coefficients[:, terms]), axis=1)
         coefficients = _solved(rows, values, 1.0 / np.maximum(off, 0.005), terms)
     return coefficients
 
 
-def _solved(rows: FloatArray, values: Float32Array, weights: FloatArray | float, terms: AnyArray) -> FloatArray:
-    """The normal equations of rows (N, T) and values (N, C), solved: (C, 25). einsum, for BLAS starts threads."""
-    weighted = (rows.T * weights).T
-    normal = np.einsum("nt,nu->tu", weighted, rows) + 1e-9 * len(rows) * np.eye(len(terms))
+def _solved(rows: FloatArray, values: Float32Array, weights: FloatArray | None, terms: AnyArray) -> FloatArray:
+    """The normal equations of rows (N, T) and values (N, C), solved: (C, 25)."""
+    n_terms = len(terms)
+    columns = np.concatenate([rows, values], axis=1)
+    weighted = rows if weights is None else rows * weights[:, None]
+    sums = np.zeros((n_terms, columns.shape[1]))
+    for start in range(0, len(rows), ROWS):
+        sums += weighted[start : start + ROWS].T @ columns[start : start + ROWS]
+    normal = sums[:, :n_terms] + 1e-9 * len(rows) * np.eye(n_terms)
     coefficients = np.zeros((values.shape[1], 25))
-    coefficients[:, terms] = np.linalg.solve(normal, np.einsum("nt,nc->tc", weighted, values)).T
+    coefficients[:, terms] = np.linalg.solve(normal, sums[:, n_terms:]).T
     return coefficients
 
 
 def _product(basis: FloatArray, coefficients: FloatArray) -> FloatArray:
     """The polynomials (C, T) at every pixel (..., T): (..., C)."""
-    return np.einsum("...t,ct->...c", basis, coefficients)
+    return basis @ coefficients.T
 
 
 def _residual(basis: FloatArray, features: Float32Array, coefficients: FloatArray) -> AnyArray:
-    return np.linalg.norm(features - _product(basis, coefficients), axis=2)
+    apart = features - _product(basis, coefficients)
+    return np.sqrt(np.einsum("hwc,hwc->hw", apart, apart))
 
 
 def _thinned(points: AnyArray) -> AnyArray:

@@ -6,7 +6,7 @@ from autopoly_env.arrays import BoolArray, Float32Array
 from autopoly_env.errors import SilhouetteError
 from autopoly_env.silhouette.background import Background, find_background
 from autopoly_env.silhouette.colours import hex_of, oklab, parse_colour
-from autopoly_env.silhouette.difference import STUDIED, beyond_cut, choose_cut
+from autopoly_env.silhouette.difference import STUDIED, beyond_cut, choose_cut, filled
 from autopoly_env.silhouette.opinion import Opinion, View
 from autopoly_env.silhouette.options import ObjectOptions
 
@@ -23,7 +23,7 @@ def opinion(view: View) -> Opinion | None:
     cut = choose_cut(distances, background)
     if cut is None:
         return None
-    mask = beyond_cut(distances, cut.level)
+    mask = beyond_cut(view.features, distances, background, cut.level)
     if not mask.any() or mask.all():
         return None
     support = background.support * (1.0 if cut.is_sharp else BLURRED)
@@ -40,16 +40,15 @@ def opinion(view: View) -> Opinion | None:
     if enclosed > HOLLOW:
         words = f"{enclosed:.0%} of what its outline encloses looks like the background"
         remarks.append(f"{words}: --background '{name}' --threshold {LOWERED} takes more of it")
-    return Opinion(mask, tuple(notes), support, tuple(remarks), name, background.is_flat)
+    is_even = background.is_even and cut.is_sharp
+    return Opinion(mask, tuple(notes), support, tuple(remarks), name, background.is_flat, is_even)
 
 
 def _enclosed_share(mask: BoolArray) -> float:
     """The share of holes in what the outline encloses, judged on about STUDIED pixels a side."""
-    from scipy.ndimage import binary_fill_holes
-
     step = max(1, max(mask.shape) // STUDIED)
     small = mask[::step, ::step]
-    return 1.0 - float(small.sum()) / max(1, int(binary_fill_holes(small).sum()))
+    return 1.0 - float(small.sum()) / max(1, int(filled(small).sum()))
 
 
 def asked(label: str, view: View, options: ObjectOptions) -> Opinion:
@@ -67,7 +66,9 @@ def asked(label: str, view: View, options: ObjectOptions) -> Opinion:
         distances = background.distances(view.features)
         cut = choose_cut(distances, background) if given is None else None
         level = given if given is not None else cut.level if cut is not None else 0.0
-        mask = beyond_cut(distances, level) if given is None else distances > level
+        mask = distances > level
+        if given is None:
+            mask = beyond_cut(view.features, distances, background, level)
         return Opinion(mask, (f"object is what differs from {options.background} by more than {level:.2f}",), 1.0)
     near = _distances(view, options.object_colour)
     if given is not None:

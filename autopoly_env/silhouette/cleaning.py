@@ -25,17 +25,18 @@ def clean(mask: BoolArray, options: ObjectOptions) -> tuple[BoolArray, list[str]
         least = max(round(SPECK_SHARE * mask.size), min(MIN_SPECK, round(SMALL_SHARE * mask.size)))
     notes = []
     labels, n_parts = parts(mask)
-    specks, n_specks = _smaller_than(least, labels, n_parts)
+    specks, n_specks = _smaller_than(least, labels, np.arange(1, n_parts + 1))
     if n_specks and (specks != mask).any():
         if options.min_speck is None and specks.sum() >= PATTERN * mask.sum():
             notes.append(f"{counted(n_specks, 'speck')} of less than {least} pixels kept, they are half of the object")
         else:
             mask, n_parts = mask & ~specks, n_parts - n_specks
             notes.append(f"{counted(n_specks, 'speck')} of less than {least} pixels dropped")
-    labels, n_holes = holes(mask)
-    pinholes, n_pinholes = _smaller_than(least, labels, n_holes)
+    labels, enclosed = holes(mask)
+    pinholes, n_pinholes = _smaller_than(least, labels, enclosed)
+    n_holes = len(enclosed) - n_pinholes
     if n_pinholes and (pinholes == mask).any():
-        mask, n_holes = mask | pinholes, n_holes - n_pinholes
+        mask = mask | pinholes
         notes.append(f"{counted(n_pinholes, 'pinhole')} of less than {least} pixels filled")
         n_parts = parts(mask)[1]  # what lay in a pinhole is joined now
     if n_parts > 1:
@@ -66,17 +67,15 @@ def parts(mask: BoolArray) -> tuple[IntArray, int]:
     return labels, int(count)
 
 
-def holes(mask: BoolArray) -> tuple[IntArray, int]:
-    """Labels (H, W) of background that does not reach the border, 1.., 0 elsewhere; 4 neighbours. And how many."""
+def holes(mask: BoolArray) -> tuple[IntArray, IntArray]:
+    """Labels (H, W) of the background, 1.., 4 neighbours, and which of them do not reach the border."""
     from skimage.measure import label
 
     labels, count = label(~mask, connectivity=1, return_num=True)
     enclosed = np.ones(count + 1, dtype=bool)
     enclosed[0] = False
     enclosed[border(labels)] = False
-    n_holes = int(enclosed.sum())
-    numbers: IntArray = np.cumsum(enclosed) * enclosed
-    return (numbers[labels] if n_holes else np.zeros_like(labels)), n_holes
+    return labels, np.flatnonzero(enclosed)
 
 
 def counted(count: int, noun: str) -> str:
@@ -84,14 +83,17 @@ def counted(count: int, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
-def _smaller_than(n_pixels: int, labels: IntArray, count: int) -> tuple[BoolArray, int]:
-    """Where the labelled parts with fewer than `n_pixels` pixels are, and how many of them there are."""
-    if n_pixels <= 1 or count == 0:
+def _smaller_than(n_pixels: int, labels: IntArray, numbers: IntArray) -> tuple[BoolArray, int]:
+    """Where those of the labelled parts that have fewer than `n_pixels` pixels are, and how many of them there are."""
+    if n_pixels <= 1 or len(numbers) == 0:
         return np.zeros(labels.shape, dtype=bool), 0
-    if count <= FEW:  # much quicker than to count them all
-        sizes = np.array([0, *(np.count_nonzero(labels == number) for number in range(1, count + 1))])
+    if len(numbers) <= FEW:  # much quicker than to count them all
+        sizes = np.array([np.count_nonzero(labels == number) for number in numbers])
     else:
-        sizes = np.bincount(labels.ravel(), minlength=count + 1)
-    small = sizes < n_pixels
-    small[0] = False
-    return small[labels] if small.any() else np.zeros(labels.shape, dtype=bool), int(small.sum())
+        sizes = np.bincount(labels.ravel())[numbers]
+    small = numbers[sizes < n_pixels]
+    if not len(small):
+        return np.zeros(labels.shape, dtype=bool), 0
+    is_small = np.zeros(int(labels.max()) + 1, dtype=bool)
+    is_small[small] = True
+    return is_small.take(labels), len(small)

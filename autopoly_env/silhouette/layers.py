@@ -28,13 +28,15 @@ def is_coloured(colour: ByteArray) -> bool:
 
 def array_layers(array: AnyArray) -> Layers:
     """Some rows of an array, in 0..1."""
-    levels = array.astype(np.float32) / np.float32(255 if array.dtype == np.uint8 else 1)
+    is_bytes = array.dtype == np.uint8
+    levels = array.astype(np.float32) / np.float32(255 if is_bytes else 1)
     if levels.ndim == 2:
         return {"grey": levels}
     n_colours = levels.shape[2] - (levels.shape[2] in (2, 4))
     layers: Layers = {"grey": levels[..., :3] @ LUMA if n_colours == 3 else levels[..., 0]}
     if n_colours == 3:
-        layers["colour"] = np.clip(np.rint(255 * levels[..., :3]), 0, 255).astype(np.uint8)
+        colour = array if is_bytes else np.clip(np.rint(255 * levels), 0, 255).astype(np.uint8)
+        layers["colour"] = colour[..., :3]
     if levels.shape[2] > n_colours:
         layers["opacity"] = levels[..., n_colours]
     return layers

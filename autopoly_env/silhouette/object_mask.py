@@ -10,11 +10,14 @@ from autopoly_env.silhouette.background import NO_FRAME, Frame, border, find_fra
 from autopoly_env.silhouette.colours import hex_of
 from autopoly_env.silhouette.inside_out import righted
 from autopoly_env.silhouette.loading import Picture
-from autopoly_env.silhouette.opinion import Opinion, View, disagreement, view_of
+from autopoly_env.silhouette.opinion import Opinion, View, are_alike, view_of
 from autopoly_env.silhouette.options import DEFAULT_OPTIONS, ObjectOptions
 
 AGREED = 0.03  # of the object: opinions that differ by less are one
 TRUSTED = 0.6  # support from which the colour of the border is believed to be that of the background
+UNSEEN = (
+    0.5  # of what differs in colour from a noisy background: if lightness finds no more, it does not see the object
+)
 ADVICE = "expected an object that differs from its background"
 TILE = 0.8  # of its extent: what is opaque is a tile, on which something may be drawn
 NOISE_LEVELS, NOISE_SIDE, NOISE_BAND = 3, 24, (0.85, 1.15)  # see `_is_noise`
@@ -140,13 +143,14 @@ def _chosen(view: View) -> Opinion | None:
     lightness = by_lightness.split(view) if np.ptp(view.levels) > 0 else None
     if colour is None or lightness is None:
         return colour or lightness
-    apart = disagreement(colour.mask, lightness.mask)
-    if apart <= AGREED and not lightness.is_clear and (colour.is_clear or colour.support >= TRUSTED):
+    agreed = are_alike(colour.mask, lightness.mask, AGREED)
+    if agreed and not lightness.is_clear and (colour.is_clear or colour.support >= TRUSTED):
         return colour.saying(*colour.remarks)
-    if apart <= AGREED:
+    if agreed:
         warnings = [remark for remark in colour.remarks if remark.startswith("warning")]
         return Opinion(lightness.mask, (*lightness.notes, *warnings), max(colour.support, lightness.support))
-    if colour.is_clear or colour.support >= (lightness.support if lightness.is_clear else TRUSTED):
+    unseen = colour.is_even and np.count_nonzero(lightness.mask) < UNSEEN * np.count_nonzero(colour.mask)
+    if colour.is_clear or unseen or colour.support >= (lightness.support if lightness.is_clear else TRUSTED):
         other = "light" if "lighter" in lightness.notes[1] else "dark"
         share = f"{_share(lightness.mask, colour.mask)} of this: --object {other}"
         return colour.saying(*colour.remarks, f"lightness alone would find another object, {share}")

@@ -51,7 +51,8 @@ class Opinion:
     """A mask (H, W) of the object, how it came about, and how well the picture supports it, 0 to 1.
 
     `remarks` are what is said beside `notes` only where another opinion is worth a word; `colour` is the background's;
-    `is_clear` says that the background is flat, or that a picture has but two levels of grey.
+    `is_clear` says that the background is flat, or that a picture has but two levels of grey; `is_even` that the
+    background is flat but for noise.
     """
 
     mask: BoolArray
@@ -60,18 +61,21 @@ class Opinion:
     remarks: tuple[str, ...] = ()
     colour: str = ""
     is_clear: bool = False
+    is_even: bool = False
 
     def saying(self, *words: str) -> "Opinion":
         """The same with more notes."""
         return replace(self, notes=(*self.notes, *words))
 
 
-def disagreement(one: BoolArray, other: BoolArray) -> float:
-    """The share of the larger object in which two masks differ, but for the pixel along a common outline."""
+def are_alike(one: BoolArray, other: BoolArray, most: float) -> bool:
+    """Whether masks differ by at most a share of the larger object, but for the pixel along a common outline."""
     differs = one ^ other
-    if not differs.any():
-        return 0.0
-    return float((differs & ~(_beside(one & other) & _beside(~(one | other)))).sum() / max(one.sum(), other.sum(), 1))
+    allowed = most * max(int(np.count_nonzero(one)), int(np.count_nonzero(other)))
+    if np.count_nonzero(differs) <= allowed:
+        return True
+    along = _beside(one & other) & _beside(~(one | other))
+    return bool(np.count_nonzero(differs & ~along) <= allowed)
 
 
 def _beside(mask: BoolArray) -> BoolArray:

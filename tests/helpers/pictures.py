@@ -32,6 +32,16 @@ def painted(mask: np.ndarray, colour: Any = (0, 0, 0), ground: Any = (255, 255, 
     return np.where(mask[..., None], np.array(colour, np.uint8), np.array(ground, np.uint8))
 
 
+def antialiased(size: int, parts: Any, ground: Any = (255, 255, 255)) -> tuple[np.ndarray, np.ndarray]:
+    """Parts (a mask of 8 times the size, and its colour) one over the other on a ground, reduced."""
+    large = np.zeros((8 * size, 8 * size, 4))
+    for mask, colour in parts:
+        large[mask] = (*colour, 1)
+    large[..., :3] = np.where(large[..., 3:] > 0, large[..., :3], ground)
+    small = large.reshape(size, 8, size, 8, 4).mean(axis=(1, 3))
+    return np.rint(small[..., :3]).astype(np.uint8), small[..., 3] >= 0.5
+
+
 def faded(picture: np.ndarray, amount: float) -> np.ndarray:
     """The picture under light that falls off towards the corners, as far as to 1 - amount."""
     height, width = picture.shape[:2]

@@ -12,7 +12,7 @@ from PIL import Image
 from autopoly_env.errors import AutoPolyError, ConfigError, SilhouetteError
 from autopoly_env.silhouette import ObjectOptions, Silhouette, load_silhouette
 from autopoly_env.silhouette.colours import hex_of, oklab, oklab_lightness, parse_colour
-from tests.helpers.pictures import SIZE, chair, disc, encoded, faded, iou, painted, pictures
+from tests.helpers.pictures import SIZE, antialiased, chair, disc, encoded, faded, iou, painted, pictures
 
 WHITE, GREY, BLACK, RED, GREEN = (255, 255, 255), (160, 160, 160), (0, 0, 0), (255, 0, 0), (0, 140, 0)
 
@@ -185,6 +185,41 @@ def test_antialiased_edge__is_cut_where_half_of_the_pixel_is_object() -> None:
     for colour, ground in (((250, 214, 60), WHITE), ((30, 60, 200), (120, 200, 90))):
         mixed = share[..., None] * np.array(colour) + (1 - share[..., None]) * np.array(ground)
         assert iou(load_silhouette(np.rint(mixed).astype(np.uint8)).mask, share >= 0.5) > 0.98
+
+
+def test_pale_part__beside_something_strong_is_no_edge_of_it() -> None:
+    x, y = np.meshgrid(*2 * [np.arange(8 * 48) / (8 * 48)])
+    trunk, sleeves = (abs(x - 0.5) < 0.22) & (abs(y - 0.5) < 0.35), (abs(x - 0.5) < 0.27) & (abs(y - 0.5) < 0.35)
+    picture, mask = antialiased(48, [(sleeves, (250, 215, 190)), (trunk, (20, 30, 90))])
+    assert iou(load_silhouette(picture).mask, mask) > 0.99
+
+
+@pytest.mark.parametrize(("body", "quality"), [((250, 220, 200), 90), ((240, 240, 240), 75)])
+def test_pale_object__that_reaches_the_border_of_a_jpeg_is_no_background(
+    body: tuple[int, int, int], quality: int
+) -> None:
+    side = 40 if quality == 75 else 96
+    banner = np.zeros((8 * side, 8 * side), dtype=bool)
+    banner[int(1.2 * side) : -int(1.2 * side)] = True
+    picture, mask = antialiased(side, [(banner, body), (disc(8 * side, 0.15), (180, 30, 40))])
+    assert iou(load_silhouette(encoded(picture, "JPEG", quality=quality)).mask, mask) > 0.95
+
+
+@pytest.mark.parametrize("n_faint", [0, 12])
+def test_drawing__whose_faint_edges_touch_the_border_is_cut_low_all_the_same(n_faint: int) -> None:
+    mask = disc(64, 0.3)
+    picture = painted(mask, (226, 221, 214), (200, 200, 200))
+    picture[disc(64, 0.1)] = (90, 20, 40)
+    picture[0, 8 : 8 + 2 * n_faint : 2] = (203, 201, 200)
+    assert iou(load_silhouette(picture).mask, mask) > 0.98
+
+
+@pytest.mark.parametrize("ground", [WHITE, (200, 200, 200), (96, 160, 120)])
+@pytest.mark.parametrize("quality", [75, 90])
+def test_sprite__saved_as_jpeg_is_found_to_its_borders(ground: tuple[int, int, int], quality: int) -> None:
+    parts = [(disc(512, 0.49), (190, 140, 100)), (disc(512, 0.12, (0.5, 0.62)), (150, 100, 70))]
+    picture, mask = antialiased(64, parts, ground)
+    assert iou(load_silhouette(encoded(picture, "JPEG", quality=quality)).mask, mask) > 0.95
 
 
 def test_noise__is_refused_and_an_honest_pattern_is_not() -> None:
