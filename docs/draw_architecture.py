@@ -27,7 +27,7 @@ TABLES = {
         registry: agents by name; from outside by my.module:Agent
         guided: nFAP-Net and WarpNet in the search | rl: policies: observation, network, environments
         search: Monte Carlo tree search; mcts, the default
-        quads: convex quads, told as they are modelled
+        quads: convex quads, told as they are modelled | warm: kernels
         climb: hill climbing on outlines | retell: a construction told again | conformance: checks agents
         trace: best polygons of contours | baselines: random, beam, greedy, ... | entry: options | contract: is it kept
         base: what every agent is: act and solve
@@ -36,7 +36,7 @@ TABLES = {
         solution: what comes out | options: YAML, key=value | weights_file: of networks | names | extras
     """,
     "autopoly_env": """
-        vector_env: many at once | wrappers: other observations
+        vector_env: many at once | wrappers: other observations | warm: compiles all kernels
         env: the Gymnasium environment | conformance: checks parts of your own
         simulator: the rules: State, transition(state, action)
         guidance: a user's wishes | targets: what is to be built | export: a mesh becomes a file

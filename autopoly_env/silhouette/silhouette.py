@@ -31,11 +31,11 @@ class Target:
     - `mask` (R, R) bool: coverage >= 0.5.
     - `row_sum`, `row_square_sum` (R, R+1) float64: prefix sums along the rows of coverage and of its square,
       from 0, so that `row_sum[y, b] - row_sum[y, a]` is the sum over the columns a..b-1.
-    - `mask_sum` (R, R+1) int64: the same of `mask`; `n_filled`: how many cells of it are set.
+    - `mask_sum` (R, R+1) float64: the same of `mask`; `n_filled`: how many cells of it are set.
 
     Where cells are not all worth the same, `weights` (R, R) >= 0 say so, rounded to multiples of 2**-20: sums of them
-    are then exact. `weight_sum` (R, R+1) are their prefix sums, None without, and each sum above (`mask_sum` and
-    `n_filled` as float64) counts every cell times its weight.
+    are then exact. `weight_sum` (R, R+1) are their prefix sums, None without, and each sum above (and
+    `n_filled`) counts every cell times its weight.
 
     `by_area`: the IoU counts a cell by the share of it that a mesh covers; otherwise as 1 from half coverage on, as the
     paper does.
@@ -47,7 +47,7 @@ class Target:
     mask: BoolArray = field(init=False)
     row_sum: FloatArray = field(init=False)
     row_square_sum: FloatArray = field(init=False)
-    mask_sum: IntArray | FloatArray = field(init=False)
+    mask_sum: FloatArray = field(init=False)
     n_filled: float = field(init=False)
     weight_sum: FloatArray | None = field(init=False)
 
@@ -67,7 +67,7 @@ class Target:
         object.__setattr__(self, "weight_sum", None if weights is None else _row_prefix_sums(weights))
         object.__setattr__(self, "row_sum", _row_prefix_sums(weighed(coverage)))
         object.__setattr__(self, "row_square_sum", _row_prefix_sums(weighed(coverage**2)))
-        object.__setattr__(self, "mask_sum", _row_prefix_sums(weighed(mask.astype(np.int64))))
+        object.__setattr__(self, "mask_sum", _row_prefix_sums(weighed(mask.astype(np.float64))))
         object.__setattr__(self, "n_filled", weighed(mask.astype(np.int64)).sum().item())
 
     @property

@@ -90,7 +90,7 @@ def test_target__prefix_sums_start_at_zero_and_end_at_the_row_total() -> None:
     assert target.row_sum.tolist() == [[0, 0.5, 0.75], [0, 0, 1]]
     assert target.row_square_sum.tolist() == [[0, 0.25, 0.3125], [0, 0, 1]]
     assert target.mask_sum.tolist() == [[0, 1, 1], [0, 0, 1]]
-    assert target.mask_sum.dtype == np.int64
+    assert target.mask_sum.dtype == np.float64
     assert target.resolution == 2 and repr(target) == "Target(resolution=2)"
 
 
