@@ -19,7 +19,8 @@ TABLES = {
         evaluate | compare | make_dataset | make_expert | train_nfap | train_warpnet | rl_clone | train_rl
         describe_networks | evaluation: agents on suites | policies: training of policies, by playing
         report: the page that compares runs | datasets: targets on disk | networks: training of networks
-        records: what was measured | run_log: of a training | parallel: processes, Ray | options: settings
+        records: what was measured | run_log: of a training | telling: signs of life, tables
+        parallel: processes, Ray | options: settings
     """,
     "agents": """
         solve | vary | retarget | export
