@@ -1,5 +1,6 @@
 """The target: a silhouette image as an exact, square object mask, and its area averages at any resolution."""
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -12,7 +13,7 @@ from autopoly_env.errors import ConfigError, SilhouetteError
 from autopoly_env.silhouette import cleaning, object_mask
 from autopoly_env.silhouette.connectivity import is_slanting_line
 from autopoly_env.silhouette.image_files import find_images
-from autopoly_env.silhouette.loading import ImageSource, Picture, read_frames
+from autopoly_env.silhouette.loading import NAMELESS, ImageSource, Picture, read_frames
 from autopoly_env.silhouette.options import DEFAULT_OPTIONS, ObjectOptions
 
 __all__ = ["SMALL", "ImageSource", "Silhouette", "Target", "find_images", "load_silhouette"]
@@ -157,7 +158,8 @@ def load_silhouette(
     float in 0..1, or a boolean mask (True is object). The object is what the alpha channel shows, where a real share of
     the picture is clear; otherwise what differs in colour or lightness from the background, which most of the border
     shows (docs/pictures-in.md). Specks and pinholes go, pictures larger than 2048 pixels a side are reduced by an
-    integer factor, and others than square ones are padded with background. The notes say what was decided, `options`
+    integer factor, and others than square ones are padded with background. What comes without a name, as arrays do, is
+    named after its pixels. The notes say what was decided, `options`
     decide otherwise.
 
     Raises SilhouetteError when the source cannot be read, holds no object or not what the options ask for.
@@ -170,7 +172,14 @@ def load_silhouette(
     shape = mask.shape
     mask, how_padded = cleaning.square(mask)
     notes = (*picture.notes, *how_found, *how_cleaned, *how_padded)
-    return Silhouette(mask, picture.name if name is None else name, notes, (shape[0], shape[1]))
+    return Silhouette(mask, _own_name(picture.name, mask) if name is None else name, notes, (shape[0], shape[1]))
+
+
+def _own_name(name: str, mask: BoolArray) -> str:
+    """The name of a picture; one that has none, such as an array, is named after its pixels."""
+    if name != NAMELESS:
+        return name
+    return f"silhouette-{hashlib.sha256(repr(mask.shape).encode() + np.packbits(mask).tobytes()).hexdigest()[:8]}"
 
 
 def _first_object(source: ImageSource, options: ObjectOptions) -> tuple[Picture, BoolArray, list[str]]:

@@ -313,7 +313,11 @@ def test_load__names_a_silhouette_after_its_file_unless_told(tmp_path: Path) -> 
     with path.open("rb") as stream, Image.open(path) as image:
         assert load_silhouette(stream).name == load_silhouette(image).name == "chair"
     assert load_silhouette(path, name="stool").name == "stool"
-    assert load_silhouette(l_shape()).name == "silhouette"
+    path = path.rename(path.with_stem("silhouette"))
+    assert load_silhouette(path).name == "silhouette"
+    own = load_silhouette(l_shape()).name
+    assert own.startswith("silhouette-") and own == load_silhouette(l_shape()).name
+    assert own != load_silhouette(l_shape()[::-1]).name
 
 
 # --- large pictures ---
