@@ -91,7 +91,7 @@ def _turn(path: Path) -> Iterator[None]:
 
 
 def _begin(part: str) -> subprocess.Popen[bytes]:
-    environment = {**os.environ, jit.ALONE: "0", "PYTHONPATH": os.pathsep.join(path or "." for path in sys.path)}
+    environment = os.environ | {jit.ALONE: "0", "PYTHONPATH": os.pathsep.join(path or "." for path in sys.path)}
     command = [sys.executable, "-m", "autopoly_env.warm", "--part", part]
     return subprocess.Popen(command, env=environment, stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
@@ -169,7 +169,15 @@ def main(arguments: list[str] | None = None) -> int:
         description="Compile all numeric kernels, once on this machine, so that nothing else has to wait for them.",
     )
     parser.add_argument("--part", choices=PARTS, help="compile this part only, in this process")
-    part: str | None = parser.parse_args(arguments).part
+    parser.add_argument("--once", action="store_true", help="unless that was done before")
+    given = parser.parse_args(arguments)
+    part: str | None = given.part
+    if given.once:
+        try:
+            ensure()
+        except KeyboardInterrupt:  # of which whoever asked for it tells
+            return 130
+        return 0
     if part is not None:
         threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
         module, _, name = PARTS[part].partition(":")

@@ -36,6 +36,12 @@ there are kept: the same command goes on with a run that was stopped, and a larg
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 
 
+def _show_config(wanted: bool) -> None:
+    if wanted:
+        print("\n".join(settings_of(SourceConfig())))
+        raise typer.Exit
+
+
 @app.command(help=HELP)
 def make(
     folder: Annotated[Path, typer.Argument(help="For the shards; made if it is not there.")],
@@ -47,13 +53,16 @@ def make(
     engine: Annotated[str, typer.Option(help="serial, process or ray.")] = "process",
     ray_address: Annotated[str | None, typer.Option(help="Of a Ray cluster.")] = None,
     show_config: Annotated[
-        bool, typer.Option("--show-config", help="Print every KEY with its value and meaning, and do no more.")
+        bool,
+        typer.Option(
+            "--show-config",
+            callback=_show_config,
+            is_eager=True,
+            help="Print every KEY with its default and meaning, and do no more.",
+        ),
     ] = False,
 ) -> int:
     source = read_config(config, overrides or [], SourceConfig())
-    if show_config:
-        print("\n".join(settings_of(source)))
-        return 0
     _claim(folder, {"version": VERSION, "held_out": held_out, "source": plain(source)})
     wanted = range(-(-n // SHARD_SIZE))
     numbers = [k for k in wanted if not _path(folder, k).exists()]

@@ -8,10 +8,10 @@ package and of its own, in whichever folder they lie.
 import contextlib
 import functools
 import hashlib
-import importlib
 import inspect
 import multiprocessing
 import os
+import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -35,8 +35,14 @@ def _seek_all() -> None:
     if _sought or os.environ.get(ALONE) == "0" or multiprocessing.parent_process() is not None:
         return
     _sought = True
-    with contextlib.suppress(ImportError):
-        importlib.import_module("autopoly_env.warm").ensure()  # by its name: it stands above all that has kernels
+    if (Path(__file__).parent.parent / "warm.py").exists():
+        with contextlib.suppress(OSError):
+            subprocess.run(
+                [sys.executable, "-m", "autopoly_env.warm", "--once"],
+                env={**os.environ, "PYTHONPATH": os.pathsep.join(path or "." for path in sys.path)},
+                stdin=subprocess.DEVNULL,
+                check=False,
+            )
 
 
 @functools.cache
