@@ -27,8 +27,8 @@ TABLES = {
         commands: what commands share: progress, results, Ctrl-C, wishes
         registry: agents by name; from outside by my.module:Agent
         guided: nFAP-Net and WarpNet in the search | rl: policies: observation, network, environments
-        search: Monte Carlo tree search; mcts, the default
-        quads: convex quads, told as they are modelled | warm: kernels
+        search: Monte Carlo tree search; mcts, the default | warm: kernels of agents
+        quads: convex quads, told as they are modelled
         climb: hill climbing on outlines | retell: a construction told again | conformance: checks agents
         trace: best polygons of contours | baselines: random, beam, greedy, ... | entry: options | contract: is it kept
         base: what every agent is: act and solve

@@ -1,5 +1,6 @@
 """All kernels compiled beforehand: by a process for each part, once, and told how far it is."""
 
+import os
 import subprocess
 import sys
 from importlib import import_module
@@ -9,6 +10,7 @@ import pytest
 
 from autopoly_env import warm
 from autopoly_env.compute import jit
+from tests.helpers.paths import ROOT
 
 DONE, BROKEN = "pass", "raise SystemExit(3)"
 
@@ -67,3 +69,24 @@ def test_nowhere_to_keep_them__means_that_nothing_is_begun(begun: list[str], mon
     monkeypatch.setattr(jit, "cache_folder", lambda: None)
     warm.ensure()
     assert not begun
+
+
+COMMANDS = (
+    "agents.solve examples/mug.png --refits 60 --out OUT/mug",
+    "agents.solve examples/key.png --style modeller --refits 60 --out OUT/key",
+    "agents.solve examples/padlock.png --agent greedy --symmetry auto --refits 60 --out OUT/padlock",
+    "agents.vary OUT/mug/mug/sequence.json --out OUT/vary",
+    "agents.retarget OUT/mug/mug/sequence.json examples/bottle.png --out OUT/retarget",
+    "training.evaluate examples/mug.png --agents greedy,trace --budget refits=30 --engine serial --out OUT/evaluate",
+)
+
+
+@pytest.mark.slow  # all kernels are compiled from nothing
+def test_commands__find_everything_compiled_after_it(tmp_path: Path) -> None:
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(ROOT)}
+    environment.pop(jit.ALONE, None)
+    for line in ("autopoly_env.warm", *COMMANDS):
+        command = [sys.executable, "-m", *line.replace("OUT", str(tmp_path)).split()]
+        done = subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True, timeout=900)
+        assert done.returncode == 0, done.stderr
+        assert ("compiling" in done.stderr) == (line == "autopoly_env.warm"), (line, done.stderr)
