@@ -77,7 +77,7 @@ COMMANDS = (
     "agents.solve examples/padlock.png --agent greedy --symmetry auto --refits 60 --out OUT/padlock",
     "agents.vary OUT/mug/mug/sequence.json --out OUT/vary",
     "agents.retarget OUT/mug/mug/sequence.json examples/bottle.png --out OUT/retarget",
-    "training.evaluate examples/mug.png --agents greedy,trace --budget refits=30 --engine serial --out OUT/evaluate",
+    "training.evaluate examples --agents greedy,trace --budget refits=30 --engine serial --out OUT/evaluate",
 )
 
 
