@@ -148,3 +148,19 @@ class Meter:
 
     def _seconds(self) -> float:
         return time.perf_counter() - self._began
+
+
+class Foresight(Meter):
+    """A meter for a search whose shapes are foreseen only: it ends where `of` does, by its seconds and states, too.
+
+    Its states and simulations count there, too; its shapes are no results and are not reported.
+    """
+
+    def __init__(self, of: Meter) -> None:
+        super().__init__(of.rest(), whole=of)
+
+    def count(self, n_refits: int, best_total: float) -> None:
+        """Note one step of work, which whoever looks ahead counts, if it was worth a refit."""
+        self._n_steps += 1
+        self._n_refits += n_refits
+        self._best_total = max(self._best_total, best_total)

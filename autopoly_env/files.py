@@ -2,13 +2,18 @@
 
 import contextlib
 import errno
+import functools
 import os
+import re
 import secrets
 import stat
+import time
 from pathlib import Path
 
 from autopoly_env.errors import OutputError
 
+_TEMPORARY = re.compile(r"\.[0-9a-f]{12}\.tmp")  # how files are called that are being written
+_PATIENCE = 3600.0  # seconds from which on nobody writes such a file any more
 _MOST_STEM = 200  # bytes: what is put behind it has to fit into the 255 of a file's name
 
 
@@ -40,6 +45,15 @@ def read_text(path: str | os.PathLike[str], most_bytes: int) -> str:
         raise OSError(errno.EILSEQ, "not UTF-8 text") from None
 
 
+@functools.lru_cache(maxsize=64)
+def _sweep(folder: Path) -> None:
+    """Remove, once in a folder, the temporary files of processes that were killed while they wrote there."""
+    with contextlib.suppress(OSError):
+        for entry in os.scandir(folder):
+            if _TEMPORARY.fullmatch(entry.name) and time.time() - entry.stat().st_mtime > _PATIENCE:
+                os.unlink(entry.path)
+
+
 def write_atomically(path: str | os.PathLike[str], data: bytes | str) -> Path:
     """Write `data` (text as UTF-8) to a file, whole or not at all, and return its path.
 
@@ -57,6 +71,7 @@ def write_atomically(path: str | os.PathLike[str], data: bytes | str) -> Path:
         real.parent.mkdir(parents=True, exist_ok=True)
         part.write_bytes(data.encode("utf-8") if isinstance(data, str) else data)
         os.replace(part, real)
+        _sweep(real.parent)
     except BaseException as error:
         if part is not None:
             with contextlib.suppress(OSError):

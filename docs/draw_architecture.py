@@ -19,14 +19,15 @@ TABLES = {
         evaluate | compare | make_dataset | make_expert | train_nfap | train_warpnet | rl_clone | train_rl
         describe_networks | evaluation: agents on suites | policies: training of policies, by playing
         report: the page that compares runs | datasets: targets on disk | networks: training of networks
-        records: what was measured | run_log: of a training | parallel: processes, Ray | options: settings
+        records: what was measured | run_log: of a training | telling: signs of life, tables
+        parallel: processes, Ray | options: settings
     """,
     "agents": """
         solve | vary | retarget | export
         commands: what commands share: progress, results, Ctrl-C, wishes
         registry: agents by name; from outside by my.module:Agent
         guided: nFAP-Net and WarpNet in the search | rl: policies: observation, network, environments
-        search: Monte Carlo tree search; mcts, the default
+        search: Monte Carlo tree search; mcts, the default | warm: kernels of agents
         quads: convex quads, told as they are modelled
         climb: hill climbing on outlines | retell: a construction told again | conformance: checks agents
         trace: best polygons of contours | baselines: random, beam, greedy, ... | entry: options | contract: is it kept
@@ -36,7 +37,7 @@ TABLES = {
         solution: what comes out | options: YAML, key=value | weights_file: of networks | names | extras
     """,
     "autopoly_env": """
-        vector_env: many at once | wrappers: other observations
+        vector_env: many at once | wrappers: other observations | warm: compiles all kernels
         env: the Gymnasium environment | conformance: checks parts of your own
         simulator: the rules: State, transition(state, action)
         guidance: a user's wishes | targets: what is to be built | export: a mesh becomes a file

@@ -145,7 +145,7 @@ def _finish(folder: Path, baseline: str | None, as_json: bool, columns: tuple[st
     from training.evaluation.folder import suite_of
     from training.evaluation.table import heads_of, lines_of, records_of, table_of, write_tables
     from training.records import read_info, read_records
-    from training.report.table import as_rich
+    from training.report.table import as_rich_parts
 
     info, records = read_info(folder), read_records(folder)
     suite = suite_of(info, folder)
@@ -161,7 +161,8 @@ def _finish(folder: Path, baseline: str | None, as_json: bool, columns: tuple[st
         console = Console()
         if not console.is_terminal:
             console.width = PLAIN_WIDTH
-        console.print(as_rich(heads_of(columns), lines_of(table, columns)))
+        for part in as_rich_parts(heads_of(columns), lines_of(table, columns), console.width):
+            console.print(part)
         for line in (*table.notes, f"Open {folder / 'table.md'}"):
             say(console, line)
     n_failed = sum(record.outcome is None for record in records)

@@ -15,7 +15,8 @@ from autopoly_env.files import write_atomically
 from training.networks.labelling import SourceConfig, build_trajectory
 from training.networks.trajectories import VERSION, Shard
 from training.options import plain, read_config
-from training.parallel import map_tasks
+from training.parallel import map_tasks, n_cores
+from training.telling import Pulse, duration, settings_of
 
 SHARD_SIZE = 64  # constructions
 
@@ -35,6 +36,12 @@ there are kept: the same command goes on with a run that was stopped, and a larg
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 
 
+def _show_config(wanted: bool) -> None:
+    if wanted:
+        print("\n".join(settings_of(SourceConfig())))
+        raise typer.Exit
+
+
 @app.command(help=HELP)
 def make(
     folder: Annotated[Path, typer.Argument(help="For the shards; made if it is not there.")],
@@ -45,22 +52,44 @@ def make(
     workers: Annotated[int | None, typer.Option(min=1, help="Processes.", show_default="as many as cores")] = None,
     engine: Annotated[str, typer.Option(help="serial, process or ray.")] = "process",
     ray_address: Annotated[str | None, typer.Option(help="Of a Ray cluster.")] = None,
+    show_config: Annotated[
+        bool,
+        typer.Option(
+            "--show-config",
+            callback=_show_config,
+            is_eager=True,
+            help="Print every KEY with its default and meaning, and do no more.",
+        ),
+    ] = False,
 ) -> int:
     source = read_config(config, overrides or [], SourceConfig())
     _claim(folder, {"version": VERSION, "held_out": held_out, "source": plain(source)})
-    numbers = [k for k in range(-(-n // SHARD_SIZE)) if not _path(folder, k).exists()]
-    began, n_failed = time.perf_counter(), 0
+    wanted = range(-(-n // SHARD_SIZE))
+    numbers = [k for k in wanted if not _path(folder, k).exists()]
+    print(_banner(folder, n, len(numbers), len(wanted), engine, workers), flush=True)
+    began, n_failed, n_done = time.perf_counter(), 0, 0
     work = partial(make_shard, source, held_out, folder)
     tasks = map_tasks(work, numbers, engine=engine, n_workers=workers, address=ray_address)
-    for n_done, done in enumerate(tasks, 1):
-        left = (time.perf_counter() - began) / n_done * (len(numbers) - n_done)
-        outcome = f"{done.value} states" if done.error is None else f"failed: {done.error}"
-        print(f"shard {done.task}: {outcome}; {n_done} of {len(numbers)}, {left:.0f} s left", flush=True)
-        n_failed += done.error is not None
+    with Pulse(lambda: f"{n_done} of {len(numbers)} shards, {duration(time.perf_counter() - began)}") as pulse:
+        for done in tasks:
+            n_done += 1
+            left = (time.perf_counter() - began) / n_done * (len(numbers) - n_done)
+            outcome = f"{done.value} states" if done.error is None else f"failed: {done.error}"
+            pulse.say(f"shard {done.task}: {outcome}; {n_done} of {len(numbers)}, {duration(left)} left")
+            n_failed += done.error is not None
     if n_failed:
         raise RunError(f"{n_failed} of {len(numbers)} shards failed; the same command tries them again")
     print(f"{folder}: {len(list(folder.glob('*.npz')))} shards of {SHARD_SIZE} constructions")
     return 0
+
+
+def _banner(folder: Path, n: int, n_missing: int, n_shards: int, engine: str, workers: int | None) -> str:
+    """What is about to happen."""
+    n_made = n_shards * SHARD_SIZE
+    why = "" if n == n_made else f" (not {n}: a shard has {SHARD_SIZE}, always the same, so that runs can go on)"
+    hands = engine if engine == "serial" else f"{engine}, {workers or n_cores()} workers"
+    known = f", {n_shards - n_missing} of them there already" if n_missing < n_shards else ""
+    return f"{folder}: {n_made} constructions{why} in {n_shards} shards{known}; {hands}"
 
 
 def make_shard(source: SourceConfig, held_out: bool, folder: Path, number: int) -> int:

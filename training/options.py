@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 
 from agents.options import put_override, read_yaml, validated
 from autopoly_env.errors import ConfigError, RunError
+from autopoly_env.files import write_atomically
 
 _Config = TypeVar("_Config")
 
@@ -54,6 +55,22 @@ def check_same_run(folder: Path, known: Any, given: Any, harmless: Collection[st
     key = _first_difference(known, given, harmless)
     if key:
         raise RunError(f"{folder} belongs to a run with another {key}; give another --out, or the same settings")
+
+
+def claim_run(folder: Path, settings: dict[str, Any], harmless: Collection[str]) -> None:
+    """Note the settings of a run that begins, in settings.json, for it may be killed before its first checkpoint.
+
+    Raises RunError as `check_same_run` where a run with other ones has begun there, OutputError where nothing can be
+    written.
+    """
+    path = folder / "settings.json"
+    try:
+        known = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):  # none yet, or half of them
+        known = None
+    if known is not None:
+        check_same_run(folder, known, settings, harmless)
+    write_atomically(path, json.dumps(settings, indent=2) + "\n")
 
 
 def _first_difference(one: Any, other: Any, harmless: Collection[str], key: str = "") -> str:

@@ -25,11 +25,12 @@ from torch.nn import functional
 from agents.rl.network import NEVER, MeshNet
 from agents.rl.weights import save_policy
 from autopoly_env.files import write_atomically
-from training.networks.command import ConfigFile, Folder, Overrides, new_app, run_training, train_network
+from training.networks.command import ConfigFile, Folder, Overrides, ShowConfig, new_app, run_training, train_network
 from training.networks.metrics import mean_rows
 from training.networks.streams import Batch, HeldOut, stored
 from training.policies.clone_samples import PICTURES, CloneConfig, CloneStream
-from training.policies.evaluation import evaluate, evaluations_of, flat, mean_final, summary
+from training.policies.evaluation import evaluate, evaluations_of, flat, mean_final, mean_start, summary
+from training.telling import table_of
 
 
 class CloneLosses(nn.Module):
@@ -93,7 +94,10 @@ def finish_clone(task: CloneTask, settings: dict[str, Any], folder: Path, _devic
     metrics = {**held_out, **flat(built), "final": mean_final(built)}
     write_atomically(folder / "report.json", json.dumps({"metrics": metrics, "settings": settings}, indent=2) + "\n")
     path = save_policy(folder / "policy.safetensors", net, "clone", settings, metrics)
-    print(f"{path}: {summary(built)}; gain_share {metrics['gain_share']:.3f}")
+    print(f"{path}: {summary(built)}")
+    print(table_of(held_out))
+    if metrics["final"] <= mean_start(built):
+        print("what it builds is no better than the untouched rectangle: it needs more steps, or more shards")
     return path
 
 
@@ -116,9 +120,9 @@ def main_command(
     overrides: Overrides = None,
     config: ConfigFile = None,
     out: Folder = Path("runs/clone"),
+    show_config: ShowConfig = False,
 ) -> int:
-    train_network(CloneConfig(), overrides, config, out, CloneTask, finish_clone)
-    return 0
+    return train_network(CloneConfig(), overrides, config, out, CloneTask, finish_clone, show_config)
 
 
 def main(arguments: list[str] | None = None) -> int:

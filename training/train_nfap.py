@@ -21,7 +21,16 @@ from torch import Tensor, nn
 
 from agents.guided.config import NfapConfig
 from agents.guided.nfap import Foresight, NfapLabels, NfapNet, loss_terms
-from training.networks.command import ConfigFile, Export, Folder, Overrides, new_app, run_training, train_network
+from training.networks.command import (
+    ConfigFile,
+    Export,
+    Folder,
+    Overrides,
+    ShowConfig,
+    new_app,
+    run_training,
+    train_network,
+)
 from training.networks.finish import finish_run
 from training.networks.metrics import mean_rows, nfap_metrics
 from training.networks.pictures import draw_nfap
@@ -129,9 +138,10 @@ def main_command(
     config: ConfigFile = None,
     out: Folder = Path("runs/nfap"),
     export: Export = False,
+    show_config: ShowConfig = False,
 ) -> int:
-    train_network(TrainNfapConfig(), overrides, config, out, NfapTask, partial(finish_run, export=export))
-    return 0
+    finish = partial(finish_run, export=export)
+    return train_network(TrainNfapConfig(), overrides, config, out, NfapTask, finish, show_config)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -10,6 +10,7 @@ checkpoint.zip, and the best policy so far, by r_all of unseen targets: policy.s
 that comes with the project.
 """
 
+import math
 import sys
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -29,12 +30,13 @@ from agents.rl.network import MeshNet
 from agents.rl.policies import put_net
 from agents.rl.weights import load_policy
 from autopoly_env.errors import ConfigError
-from training.networks.command import ConfigFile, Export, Overrides, new_app, run_training
+from training.networks.command import ConfigFile, Export, Overrides, ShowConfig, new_app, print_config, run_training
 from training.options import read_config
 from training.policies.config import RlRunConfig, TrainRlConfig
 from training.policies.export import export_policy
 from training.policies.run_state import LearningRate, RunState, state_in
 from training.policies.session import Session
+from training.telling import Pulse
 
 
 def train_rl(config: TrainRlConfig, folder: Path, trust: bool = False) -> RunState:
@@ -68,12 +70,29 @@ def train_rl(config: TrainRlConfig, folder: Path, trust: bool = False) -> RunSta
             put_net(model.policy, initial_net(config, trust))
         session = Session(config, folder, state, lr)
         if not session.is_over:
-            with progress_bar(run.total_steps, "steps", n_done=state.step, takes_prints=True) as session.bar:
+            print(_banner(config, folder, state), flush=True)
+            with (
+                Pulse(session.stands),
+                progress_bar(run.total_steps, "steps", n_done=state.step, takes_prints=True) as session.bar,
+            ):
                 model.learn(run.total_steps - state.step, session, log_interval=None, reset_num_timesteps=False)  # type: ignore[arg-type]
             session.end()
     finally:
         envs.close()
     return state
+
+
+def _banner(config: TrainRlConfig, folder: Path, state: RunState) -> str:
+    """What is about to happen."""
+    run = config.run
+    limit = f", {run.minutes:g} minutes at most with all exams" if run.minutes else ""
+    first = "before the first step, then " if run.init and not state.step else ""
+    return (
+        f"{config.algorithm} in {folder}: {run.n_envs} environments ({run.envs}) on {run.device}, "
+        f"{run.total_steps - state.step} steps{limit}\n"
+        f"exams: {first}every {run.eval_every} steps, on {run.n_eval} unseen targets of each of "
+        f"{len(config.env.courses)} tasks; steps a second and when the next exam comes are said after the first update"
+    )
 
 
 def initial_net(config: TrainRlConfig, trust: bool) -> MeshNet:
@@ -101,6 +120,16 @@ def _seed(run: RlRunConfig, step: int) -> int:
     return int(np.random.SeedSequence((run.seed, step)).generate_state(1)[0] >> 1)
 
 
+def told_of(state: RunState, path: Path) -> str:
+    """What came out, beside what a policy is given to begin with."""
+    result = f"{path}: the policy of step {state.best_step}, mean r_all {state.best:.2f}"
+    if not math.isfinite(state.rectangle):
+        return result
+    if state.has_learnt:
+        return f"{result} (the untouched rectangle has {state.rectangle:.2f}): the best so far"
+    return f"{result}, is no better than the untouched rectangle ({state.rectangle:.2f}): it needs more steps"
+
+
 HELP = """Train a policy with an algorithm of Stable-Baselines3.
 
 \b
@@ -125,14 +154,17 @@ def main_command(
     minutes: Annotated[float | None, typer.Option(min=0.0, help="After which it ends, as run.minutes.")] = None,
     trust: Annotated[bool, typer.Option("--trust", help="Load a zip from elsewhere, though it can run code.")] = False,
     export: Export = False,
+    show_config: ShowConfig = False,
 ) -> int:
     settings = read_config(config, overrides or [], TrainRlConfig())
+    if show_config:
+        return print_config(settings)
     if minutes is not None:
         settings = replace(settings, run=replace(settings.run, minutes=minutes))
     folder = out or Path("runs") / settings.algorithm
     state = train_rl(settings, folder, trust)
     path = folder / "policy.safetensors"
-    print(f"{path}: the policy of step {state.best_step}, mean r_all {state.best:.2f}")
+    print(told_of(state, path))
     if export:
         print(f"exported to {export_policy(path, settings.algorithm, sys.argv[1:])}")
     return 0

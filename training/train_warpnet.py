@@ -22,7 +22,16 @@ from torch import Tensor, nn
 from agents.guided.config import WarpConfig
 from agents.guided.warp import Theta, Warp, WarpNet, loss_terms
 from autopoly_env.errors import ConfigError
-from training.networks.command import ConfigFile, Export, Folder, Overrides, new_app, run_training, train_network
+from training.networks.command import (
+    ConfigFile,
+    Export,
+    Folder,
+    Overrides,
+    ShowConfig,
+    new_app,
+    run_training,
+    train_network,
+)
 from training.networks.finish import finish_run
 from training.networks.metrics import mean_rows, warp_metrics
 from training.networks.pictures import draw_warp
@@ -135,9 +144,10 @@ def main_command(
     config: ConfigFile = None,
     out: Folder = Path("runs/warpnet"),
     export: Export = False,
+    show_config: ShowConfig = False,
 ) -> int:
-    train_network(TrainWarpnetConfig(), overrides, config, out, WarpTask, partial(finish_run, export=export))
-    return 0
+    finish = partial(finish_run, export=export)
+    return train_network(TrainWarpnetConfig(), overrides, config, out, WarpTask, finish, show_config)
 
 
 def main(arguments: list[str] | None = None) -> int:

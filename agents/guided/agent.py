@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from agents.base import Agent, Decision
-from agents.budget import Meter
+from agents.budget import Foresight, Meter
 from agents.extras import require
 from agents.guided.config import NfapMctsConfig, NfapPriorConfig
 from agents.search.mcts import MctsAgent
@@ -49,7 +49,7 @@ class NfapMctsAgent(Agent):
         best_total, failures = track.state.score.total, 0
         while not track.state.done and failures < self._config.patience and not meter.spent():
             n_before = simulator.n_refits
-            following = self._step(simulator, track.state)
+            following = self._step(simulator, track.state, meter)
             if following is None:
                 return
             meter.add([following], simulator.n_refits - n_before)
@@ -59,9 +59,9 @@ class NfapMctsAgent(Agent):
             if track.state.score.total > best_total:
                 best_total, failures = track.state.score.total, 0
 
-    def _step(self, simulator: Simulator, state: State) -> State | None:
-        """The state to go on from; None where nothing can be done."""
-        chosen = self.act(simulator, state).action
+    def _step(self, simulator: Simulator, state: State, meter: Meter) -> State | None:
+        """The state to go on from; None where nothing can be done. Warps are no refits, but take time and memory."""
+        chosen = self._searcher.decide(simulator, state, Foresight(meter)).action
         candidates = [chosen]
         if chosen == STOP:
             legal = simulator.legal_actions(state)[1:]

@@ -47,9 +47,13 @@ class MctsAgent(Agent):
 
     def act(self, simulator: Simulator, state: State) -> Decision:
         """Search a tree of its own from `state`; STOP where nothing in it is better. No incumbents are asked."""
+        return self.decide(simulator, state, Meter.unlimited())
+
+    def decide(self, simulator: Simulator, state: State, meter: Meter) -> Decision:
+        """`act`, as long as the meter lets it."""
         rng = np.random.default_rng((self._config.seed, state.step))
         search = Search(simulator, self._evaluator, self._config, rng, Node(Track(state)))
-        best_total = max((t.state.score.total for t in search.grow(Meter.unlimited())), default=state.score.total)
+        best_total = max((t.state.score.total for t in search.grow(meter)), default=state.score.total)
         chosen = search.committed()
         if chosen is None or chosen.track.state.action is None or best_total <= state.score.total:
             return Decision(STOP, value=state.score.total)

@@ -9,15 +9,40 @@ import contextlib
 import functools
 import hashlib
 import inspect
+import multiprocessing
+import os
+import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from numba import njit
+import numba
+from numba import njit, types
 from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
+from numba.core.registry import cpu_target
 
-_announced = False
+ALONE = "AUTOPOLY_WARM"  # a variable of the environment: 0 in a process that is to compile what it calls by itself
+_announced = _sought = False
+
+
+def _seek_all() -> None:
+    """Once, before this process compiles its first kernel: have all kernels compiled, by several processes at once.
+
+    Not so in workers, of which there may be many: whoever starts them sees to it.
+    """
+    global _sought
+    if _sought or os.environ.get(ALONE) == "0" or multiprocessing.parent_process() is not None:
+        return
+    _sought = True
+    if (Path(__file__).parent.parent / "warm.py").exists():
+        with contextlib.suppress(OSError):
+            subprocess.run(
+                [sys.executable, "-m", "autopoly_env.warm", "--once"],
+                env={**os.environ, "PYTHONPATH": os.pathsep.join(path or "." for path in sys.path)},
+                stdin=subprocess.DEVNULL,
+                check=False,
+            )
 
 
 @functools.cache
@@ -38,12 +63,31 @@ def _package_of(source: Path) -> Path:
     return folder
 
 
+def stamp_of(package: Path) -> bytes:
+    """A hash of all kernel files of a package, and of how they are compiled."""
+    return _kernel_sources_stamp(package)
+
+
+def machine() -> bytes:
+    """What code that is compiled is for: the processor, and Numba's version."""
+    return repr((numba.__version__, cpu_target.target_context.codegen().magic_tuple())).encode()
+
+
+def cache_folder() -> Path | None:
+    """Where what this file compiles would be kept; None where that cannot be written."""
+    try:
+        return Path(FunctionCache(_announce_compilation).cache_path)
+    except (RuntimeError, OSError):
+        return None
+
+
 def _announce_compilation() -> None:
     global _announced
     if not _announced:
         _announced = True
         print(
-            "autopoly_env: compiling the numeric kernels (once on this machine, about a minute) ...",
+            "autopoly_env: compiling the numeric kernels that this needs ("
+            "`python -m autopoly_env.warm` compiles all, once on this machine) ...",
             file=sys.stderr,
             flush=True,
         )
@@ -87,12 +131,18 @@ class _KernelCache(FunctionCache):
         )
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        found = None
-        with contextlib.suppress(OSError):
-            found = super().load_overload(sig, target_context)
+        found = self._loaded(sig, target_context)
+        if found is None:
+            _seek_all()
+            found = self._loaded(sig, target_context)
         if found is None:
             _announce_compilation()
         return found
+
+    def _loaded(self, sig: Any, target_context: Any) -> Any:
+        with contextlib.suppress(OSError):
+            return super().load_overload(sig, target_context)
+        return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         with contextlib.suppress(OSError):
@@ -108,7 +158,12 @@ class _NoCache(NullCache):
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile `function` to machine code that runs without the GIL, IEEE division included, cached on disk."""
-    compiled = njit(nogil=True, error_model="numpy")(function)
+    inner = function.__name__.startswith("_")
+    compiled = njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True, no_cpython_wrapper=inner)(function)
+    template_of = compiled.get_call_template
+    compiled.get_call_template = lambda args, kws: template_of(
+        tuple(map(types.unliteral, args)), {name: types.unliteral(kind) for name, kind in kws.items()}
+    )  # a call with a constant is no other call: Numba would compile the kernel once more for it
     try:
         compiled._cache = _KernelCache(function)
     except (RuntimeError, OSError):

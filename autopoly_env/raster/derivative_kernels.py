@@ -3,8 +3,7 @@
 Only touched cells depend on the vertices; the rest of a row is constant spans, whose squared error prefix sums of the
 target give. Letters and units as in `raster_kernels`.
 
-Pixels may have weights, which the prefix sums of a `Picture` then count. Without (None) every pixel weighs 1, and Numba
-compiles kernels that know of no weights.
+Pixels may have weights, which the prefix sums of a `Picture` then count. Without (`NO_WEIGHTS`) every pixel weighs 1.
 """
 
 import numpy as np
@@ -63,9 +62,9 @@ def half_gradient(
 
 
 @kernel
-def _weighed(residual: float, row: int, column: int, weight_sum: FloatArray | None) -> float:
+def _weighed(residual: float, row: int, column: int, weight_sum: FloatArray) -> float:
     """The residual of a pixel times its weight."""
-    if weight_sum is None:
+    if weight_sum.shape[0] == 0:
         return residual
     return residual * (weight_sum[row, column + 1] - weight_sum[row, column])
 
@@ -150,10 +149,10 @@ def normal_equations(
 
 @kernel
 def _scaled_row(
-    m: int, residual: float, row: int, column: int, rows: FloatArray, weight_sum: FloatArray | None
+    m: int, residual: float, row: int, column: int, rows: FloatArray, weight_sum: FloatArray
 ) -> float:  # fmt: skip
     """Multiply a pixel's row of the Jacobian, `rows[:m]`, by the root of its weight; return the residual times that."""
-    if weight_sum is None:
+    if weight_sum.shape[0] == 0:
         return residual
     root = np.sqrt(weight_sum[row, column + 1] - weight_sum[row, column])
     for a in range(m):

@@ -33,21 +33,25 @@ class Workspace(NamedTuple):
     pieces: FloatArray  # (P, 4) EDGE, integrals START of (1 - t) and END of t, NEXT piece of the same cell
 
 
+NO_WEIGHTS = np.empty((0, 0))  # where every pixel weighs 1
+NO_WEIGHTS.setflags(write=False)
+
+
 class Picture(NamedTuple):
     """A target as it is compared with a rendering, pixel by pixel: see `autopoly_env.silhouette.Target`."""
 
     coverage: FloatArray  # (R, R)
     row_sum: FloatArray  # (R, R+1) prefix sums of it along the rows
     row_square_sum: FloatArray  # (R, R+1) the same of its square
-    weight_sum: FloatArray | None = None  # (R, R+1) of the pixels' weights, which the two sums above then count, too
+    weight_sum: FloatArray = NO_WEIGHTS  # (R, R+1) of the pixels' weights, which the two sums above then count, too
 
 
 class Pixels(NamedTuple):
     """A target as the IoU counts it: see `autopoly_env.silhouette.Target`."""
 
     mask: BoolArray  # (R, R)
-    mask_sum: IntArray | FloatArray  # (R, R+1) prefix sums of it along the rows, of the weights if there are any
-    weight_sum: FloatArray | None = None  # (R, R+1)
+    mask_sum: FloatArray  # (R, R+1) prefix sums of it along the rows, of the weights if there are any
+    weight_sum: FloatArray = NO_WEIGHTS  # (R, R+1)
     by_area: bool = False  # whether a pixel counts by the share of it that is covered, and not as covered by half
 
 
@@ -211,10 +215,10 @@ def coverage_image(points: FloatArray, edges: IntArray, size: int, work: Workspa
 
 
 @kernel
-def span_weight(row: int, first: int, last: int, weight_sum: FloatArray | None) -> float:
+def span_weight(row: int, first: int, last: int, weight_sum: FloatArray) -> float:
     """What the pixels first..last-1 of a row weigh together: each 1, or as `weight_sum` (R, R+1) along rows says."""
-    if weight_sum is None:
-        return last - first
+    if weight_sum.shape[0] == 0:
+        return float(last - first)
     return weight_sum[row, last] - weight_sum[row, first]
 
 

@@ -59,12 +59,16 @@ def coverage(mesh: PolyMesh, resolution: int) -> FloatArray:
 
 def picture_of(target: Target) -> Picture:
     """The target as the kernels of derivatives read it."""
-    return Picture(target.coverage, target.row_sum, target.row_square_sum, target.weight_sum)
+    return Picture(target.coverage, target.row_sum, target.row_square_sum, _weight_sum(target))
 
 
 def pixels_of(target: Target) -> Pixels:
     """The target as the kernels that count pixels read it."""
-    return Pixels(target.mask, target.mask_sum, target.weight_sum, target.by_area)
+    return Pixels(target.mask, target.mask_sum, _weight_sum(target), target.by_area)
+
+
+def _weight_sum(target: Target) -> FloatArray:
+    return raster_kernels.NO_WEIGHTS if target.weight_sum is None else target.weight_sum
 
 
 def loss_and_gradient(mesh: PolyMesh, target: Target) -> tuple[float, FloatArray]:

@@ -16,6 +16,7 @@ from autopoly_env.refit.shape_kernels import (
     Shape,
     obey,
     offer,
+    put,
     tie_gradient,
     tie_normal,
 )
@@ -45,7 +46,7 @@ def near_phase(
     factor = 1e-2
     for _step in range(settings.n_near):
         best.record[N_EVALUATIONS] += 1
-        matrix[:] = normal
+        put(normal, matrix)
         for k in range(2 * n):
             matrix[k, k] += factor * normal[k, k] + settings.damping
             move[k] = -gradient[k >> 1, k & 1]
@@ -73,7 +74,7 @@ def near_phase(
                 return
             continue
         gain = loss - next_loss
-        unknowns[:] = candidate
+        put(candidate, unknowns)
         loss = next_loss
         gradient, next_gradient = next_gradient, gradient
         normal, next_normal = next_normal, normal

@@ -25,6 +25,7 @@ from autopoly_env.refit.shape_kernels import (
     loss_at,
     obey,
     offer,
+    put,
     rebase,
     take_boundary,
 )
@@ -49,8 +50,8 @@ def refit(
             unknowns[k, axis] = start[v, axis]
             low, high = min(low, start[v, axis]), max(high, start[v, axis])
     fine = pyramid[len(pyramid) - 1]
-    crossings, hairlines, flipped = defects(start, shape.edges, shape.on_rim, shape.corners, shape.offsets)
-    best = Progress(start, start.copy(), np.empty_like(start), np.zeros(7))
+    best = Progress(start.copy(), start.copy(), np.empty((start.shape[0], 2)), np.zeros(7))
+    crossings, hairlines, flipped = defects(best.start, shape.edges, shape.on_rim, shape.corners, shape.offsets)
     best.record[MOST_CROSSINGS] = 1e9 if settings.keep_defects else crossings
     best.record[MOST_HAIRLINES] = 1e9 if settings.keep_defects else hairlines
     best.record[MOST_FLIPPED] = 1e9 if settings.keep_defects else flipped
@@ -71,9 +72,9 @@ def refit(
     if best.record[LOSS] <= loss_before:
         _restore_idle(shape, fine, work, best)
     if not best.record[LOSS] < loss_before:
-        result[:] = start
+        put(best.start, result)
         return loss_before, loss_before, int(best.record[N_EVALUATIONS])
-    result[:] = best.points
+    put(best.points, result)
     return loss_before, best.record[LOSS], int(best.record[N_EVALUATIONS])
 
 

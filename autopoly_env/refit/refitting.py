@@ -25,7 +25,7 @@ from autopoly_env.mesh import ASKED_TURN, FaceRule, PolyMesh, Topology
 from autopoly_env.raster import picture_of, workspace
 from autopoly_env.raster.raster_kernels import Picture
 from autopoly_env.refit import refit_kernels
-from autopoly_env.refit.rule_kernels import FREE, LOCKED, Rule
+from autopoly_env.refit.rule_kernels import FREE, LOCKED, NO_RULE, Rule
 from autopoly_env.refit.shape_kernels import Settings, Shape, Ties
 from autopoly_env.silhouette import Silhouette, Target
 
@@ -161,7 +161,7 @@ def _bound(shape: Shape, bonds: Bonds) -> Shape:
     free = [k for k, v in enumerate(shape.inner) if not bonds.locked[v]]
     parts = [shape.neighbours[shape.neighbour_offsets[k] : shape.neighbour_offsets[k + 1]] for k in free]
     rule = shape.rule
-    if rule is not None:
+    if rule is not NO_RULE:
         partners = np.where(images < 0, FREE, numbers[images])
         rule = rule._replace(images=np.where(bonds.locked[shape.boundary], LOCKED, partners))
     return shape._replace(

@@ -29,15 +29,19 @@ class Rule(NamedTuple):
     asked: float  # the sine by which every corner should turn
 
 
+_NOTHING = np.empty(0, np.int64)
+NO_RULE = Rule(np.empty((0, 3), np.int64), _NOTHING, _NOTHING, _NOTHING, _NOTHING, 0.0)
+
+
 @kernel
 def hinge(
-    rule: Rule | None, origin: FloatArray, unknowns: FloatArray, size: int, gradient: FloatArray, normal: FloatArray
+    rule: Rule, origin: FloatArray, unknowns: FloatArray, size: int, gradient: FloatArray, normal: FloatArray
 ) -> float:
     """What the corners that turn too little cost, and inner vertices that do not follow their neighbours.
 
     Adds half the gradient J'r to `gradient` (N, 2) and J'J to the lower triangle of `normal` (2N, 2N), both per pixel.
     """
-    if rule is None:
+    if rule.triples.shape[0] == 0:
         return 0.0
     loss = 0.0
     slope = np.empty(6)
@@ -53,7 +57,8 @@ def hinge(
         slope[0], slope[1] = by, -bx
         slope[2], slope[3] = -by - ay, bx + ax
         slope[4], slope[5] = ay, -ax
-        slope /= a + b
+        for i in range(6):
+            slope[i] /= a + b
         loss += _WEIGHT * residual * residual
         for i in range(6):
             u, k = rule.triples[c, i >> 1], i & 1
@@ -93,12 +98,12 @@ def _following(
 
 
 @kernel
-def hold(rule: Rule | None, unknowns: FloatArray, low: float, high: float) -> None:
+def hold(rule: Rule, unknowns: FloatArray, low: float, high: float) -> None:
     """Move each corner that turns too little, and those beside it, by the least that makes it turn, inside the box.
 
     One corner after the other, in sweeps, as position-based dynamics do (Müller et al. 2007).
     """
-    if rule is None:
+    if rule.triples.shape[0] == 0:
         return
     slope = np.empty((3, 2))
     for _sweep in range(_SWEEPS):
@@ -121,7 +126,7 @@ def hold(rule: Rule | None, unknowns: FloatArray, low: float, high: float) -> No
                 if image == rule.triples[c, i]:
                     slope[i, 0] = 0.0
                 elif image == LOCKED:
-                    slope[i] = 0.0
+                    slope[i, 0] = slope[i, 1] = 0.0
                 steepness += slope[i, 0] ** 2 + slope[i, 1] ** 2
             if not steepness > 0.0:
                 continue

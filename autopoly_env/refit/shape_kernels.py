@@ -16,7 +16,7 @@ from autopoly_env.mesh.corner_kernels import keeps_turns
 from autopoly_env.mesh.geometry_kernels import defects
 from autopoly_env.raster.derivative_kernels import half_gradient
 from autopoly_env.raster.raster_kernels import Picture, Workspace
-from autopoly_env.refit.rule_kernels import Rule
+from autopoly_env.refit.rule_kernels import NO_RULE, Rule
 
 
 class Ties(NamedTuple):
@@ -25,6 +25,9 @@ class Ties(NamedTuple):
     leader: IntArray  # (N,) the unknown of which this one is the mirror image; itself where it is none, -1 where locked
     on_axis: BoolArray  # (N,) the unknowns that stay on the axis
     axis: float  # x of the axis
+
+
+NO_TIES = Ties(np.empty(0, np.int64), np.empty(0, np.bool_), 0.5)
 
 
 class Shape(NamedTuple):
@@ -39,8 +42,8 @@ class Shape(NamedTuple):
     inner: IntArray  # (K,) vertices that are not on the boundary
     neighbours: IntArray  # vertices joined to each inner vertex, one after the other
     neighbour_offsets: IntArray  # (K+1,)
-    ties: Ties | None = None  # None where all unknowns are free: Numba then compiles a refit that knows of no ties
-    rule: Rule | None = None  # None where faces may have any corners: likewise
+    ties: Ties = NO_TIES  # where all unknowns are free
+    rule: Rule = NO_RULE  # where faces may have any corners
 
 
 class Settings(NamedTuple):
@@ -70,9 +73,17 @@ MOST_HAIRLINES = 6
 
 
 @kernel
-def obey(ties: Ties | None, boundary: IntArray, best: Progress, unknowns: FloatArray) -> None:
+def put(values: FloatArray, into: FloatArray) -> None:
+    """Copy an array (n, m). Numba's own assignment would compile for seconds, for its texts of shapes that differ."""
+    for i in range(values.shape[0]):
+        for j in range(values.shape[1]):
+            into[i, j] = values[i, j]
+
+
+@kernel
+def obey(ties: Ties, boundary: IntArray, best: Progress, unknowns: FloatArray) -> None:
     """Put the unknowns that are tied where their ties want them: locked ones at their start, images opposite."""
-    if ties is None:
+    if ties.leader.shape[0] == 0:
         return
     start = best.start
     low, high = best.record[LOW], best.record[HIGH]
@@ -90,9 +101,9 @@ def obey(ties: Ties | None, boundary: IntArray, best: Progress, unknowns: FloatA
 
 
 @kernel
-def tie_gradient(ties: Ties | None, gradient: FloatArray) -> None:
+def tie_gradient(ties: Ties, gradient: FloatArray) -> None:
     """Turn a gradient (N, 2) of free unknowns into that of the leading ones, 0 for those that do not lead."""
-    if ties is None:
+    if ties.leader.shape[0] == 0:
         return
     for n in range(gradient.shape[0]):
         leader = ties.leader[n]
@@ -107,10 +118,10 @@ def tie_gradient(ties: Ties | None, gradient: FloatArray) -> None:
 
 
 @kernel
-def tie_normal(ties: Ties | None, normal: FloatArray) -> None:
+def tie_normal(ties: Ties, normal: FloatArray) -> None:
     """The same for the lower triangle of J'J (2N, 2N): rows and columns of images are added to those of their leaders,
     and all that do not lead become those of the unit matrix."""
-    if ties is None:
+    if ties.leader.shape[0] == 0:
         return
     size = normal.shape[0]
     for i in range(size):
@@ -123,10 +134,13 @@ def tie_normal(ties: Ties | None, normal: FloatArray) -> None:
             continue
         if leader >= 0 and leader != n:
             sign = -1.0 if axis == 0 else 1.0
-            normal[2 * leader + axis, :] += sign * normal[k, :]
-            normal[:, 2 * leader + axis] += sign * normal[:, k]
-        normal[k, :] = 0.0
-        normal[:, k] = 0.0
+            for i in range(size):
+                normal[2 * leader + axis, i] += sign * normal[k, i]
+            for i in range(size):
+                normal[i, 2 * leader + axis] += sign * normal[i, k]
+        for i in range(size):
+            normal[k, i] = 0.0
+            normal[i, k] = 0.0
         normal[k, k] = 1.0
 
 
@@ -136,7 +150,7 @@ def spread(unknowns: FloatArray, shape: Shape, best: Progress) -> None:
     move."""
     start, points = best.start, best.trial
     low, high = best.record[LOW], best.record[HIGH]
-    points[:] = start
+    put(start, points)
     for n in range(shape.boundary.shape[0]):
         points[shape.boundary[n], 0] = unknowns[n, 0]
         points[shape.boundary[n], 1] = unknowns[n, 1]
@@ -164,21 +178,16 @@ def offer(unknowns: FloatArray, shape: Shape, loss: float, best: Progress) -> bo
     sane = sane and keeps_rule(shape, best.trial, best.start)
     if sane and loss < best.record[LOSS]:
         best.record[LOSS] = loss
-        best.points[:] = best.trial
+        put(best.trial, best.points)
     return sane
 
 
 @kernel
 def keeps_rule(shape: Shape, points: FloatArray, start: FloatArray) -> bool:
     """Whether every corner turns as it should, or by no less than it did at the start."""
-    return _keeps(shape.rule, shape, points, start)
-
-
-@kernel
-def _keeps(rule: Rule | None, shape: Shape, points: FloatArray, start: FloatArray) -> bool:
-    if rule is None:
+    if shape.rule.triples.shape[0] == 0:
         return True
-    return keeps_turns(points, start, shape.corners, shape.offsets, rule.asked)
+    return keeps_turns(points, start, shape.corners, shape.offsets, shape.rule.asked)
 
 
 @kernel

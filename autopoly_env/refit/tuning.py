@@ -5,6 +5,7 @@ import numpy as np
 from autopoly_env.mesh import FaceRule, PolyMesh
 from autopoly_env.raster import pixels_of, workspace
 from autopoly_env.refit.refitting import Bonds, rule_of, shape_of
+from autopoly_env.refit.rule_kernels import NO_RULE
 from autopoly_env.refit.tuning_kernels import tune as tune_in_place
 from autopoly_env.silhouette import Target
 
@@ -23,7 +24,7 @@ def tune(mesh: PolyMesh, target: Target, bonds: Bonds | None = None, faces: Face
     tune_in_place(
         points,
         edges,
-        shape_of(mesh.topology)._replace(rule=None if faces == "any" else rule_of(mesh.topology)),
+        shape_of(mesh.topology)._replace(rule=NO_RULE if faces == "any" else rule_of(mesh.topology)),
         images,
         0.5 if bonds is None else bonds.axis,
         pixels_of(target),

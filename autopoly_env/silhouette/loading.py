@@ -42,6 +42,7 @@ RIGHTING = {
     8: (True, True, False),
 }
 
+NAMELESS = ""  # the name of a picture that has none, such as an array
 _pillow_lock = threading.Lock()
 
 
@@ -88,12 +89,12 @@ def read_frames(source: ImageSource) -> Iterator[Picture]:
     if isinstance(source, Image.Image):
         given_name = getattr(source, "filename", "")
         name = Path(given_name).stem if isinstance(given_name, (str, os.PathLike)) else ""
-        return iter([_read_pillow(source, name or "silhouette", "the given image")])
+        return iter([_read_pillow(source, name, "the given image")])
     if isinstance(source, np.ndarray):
         return iter([_read_array(source)])
     if hasattr(source, "read"):
         given_name = getattr(source, "name", None)
-        name = Path(given_name).stem if isinstance(given_name, str) else "silhouette"
+        name = Path(given_name).stem if isinstance(given_name, str) else NAMELESS
         return _read_stream(source, name, "the given file object")
     kind = type(source).__name__
     raise SilhouetteError(f"cannot load a {kind}; expected a path, a binary file object, a PIL image or a numpy array")
@@ -188,8 +189,8 @@ def _read_array(array: AnyArray) -> Picture:
             raise SilhouetteError(f"{label} spans {low:g}..{high:g}; expected floats in 0..1: rescale it")
     layers, notes = reduced(lambda top, end: array_layers(array[top:end]), width, height)
     if is_mask:
-        return Picture(None, None, layers["grey"], "silhouette", label, tuple(notes))
-    return _picture(layers, "silhouette", label, notes)
+        return Picture(None, None, layers["grey"], NAMELESS, label, tuple(notes))
+    return _picture(layers, NAMELESS, label, notes)
 
 
 def _picture(layers: Layers, name: str, label: str, notes: list[str]) -> Picture:

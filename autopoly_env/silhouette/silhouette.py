@@ -1,5 +1,6 @@
 """The target: a silhouette image as an exact, square object mask, and its area averages at any resolution."""
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -12,7 +13,7 @@ from autopoly_env.errors import ConfigError, SilhouetteError
 from autopoly_env.silhouette import cleaning, object_mask
 from autopoly_env.silhouette.connectivity import is_slanting_line
 from autopoly_env.silhouette.image_files import find_images
-from autopoly_env.silhouette.loading import ImageSource, Picture, read_frames
+from autopoly_env.silhouette.loading import NAMELESS, ImageSource, Picture, read_frames
 from autopoly_env.silhouette.options import DEFAULT_OPTIONS, ObjectOptions
 
 __all__ = ["SMALL", "ImageSource", "Silhouette", "Target", "find_images", "load_silhouette"]
@@ -31,11 +32,11 @@ class Target:
     - `mask` (R, R) bool: coverage >= 0.5.
     - `row_sum`, `row_square_sum` (R, R+1) float64: prefix sums along the rows of coverage and of its square,
       from 0, so that `row_sum[y, b] - row_sum[y, a]` is the sum over the columns a..b-1.
-    - `mask_sum` (R, R+1) int64: the same of `mask`; `n_filled`: how many cells of it are set.
+    - `mask_sum` (R, R+1) float64: the same of `mask`; `n_filled`: how many cells of it are set.
 
     Where cells are not all worth the same, `weights` (R, R) >= 0 say so, rounded to multiples of 2**-20: sums of them
-    are then exact. `weight_sum` (R, R+1) are their prefix sums, None without, and each sum above (`mask_sum` and
-    `n_filled` as float64) counts every cell times its weight.
+    are then exact. `weight_sum` (R, R+1) are their prefix sums, None without, and each sum above (and
+    `n_filled`) counts every cell times its weight.
 
     `by_area`: the IoU counts a cell by the share of it that a mesh covers; otherwise as 1 from half coverage on, as the
     paper does.
@@ -47,7 +48,7 @@ class Target:
     mask: BoolArray = field(init=False)
     row_sum: FloatArray = field(init=False)
     row_square_sum: FloatArray = field(init=False)
-    mask_sum: IntArray | FloatArray = field(init=False)
+    mask_sum: FloatArray = field(init=False)
     n_filled: float = field(init=False)
     weight_sum: FloatArray | None = field(init=False)
 
@@ -67,7 +68,7 @@ class Target:
         object.__setattr__(self, "weight_sum", None if weights is None else _row_prefix_sums(weights))
         object.__setattr__(self, "row_sum", _row_prefix_sums(weighed(coverage)))
         object.__setattr__(self, "row_square_sum", _row_prefix_sums(weighed(coverage**2)))
-        object.__setattr__(self, "mask_sum", _row_prefix_sums(weighed(mask.astype(np.int64))))
+        object.__setattr__(self, "mask_sum", _row_prefix_sums(weighed(mask.astype(np.float64))))
         object.__setattr__(self, "n_filled", weighed(mask.astype(np.int64)).sum().item())
 
     @property
@@ -157,7 +158,8 @@ def load_silhouette(
     float in 0..1, or a boolean mask (True is object). The object is what the alpha channel shows, where a real share of
     the picture is clear; otherwise what differs in colour or lightness from the background, which most of the border
     shows (docs/pictures-in.md). Specks and pinholes go, pictures larger than 2048 pixels a side are reduced by an
-    integer factor, and others than square ones are padded with background. The notes say what was decided, `options`
+    integer factor, and others than square ones are padded with background. What comes without a name, as arrays do, is
+    named after its pixels. The notes say what was decided, `options`
     decide otherwise.
 
     Raises SilhouetteError when the source cannot be read, holds no object or not what the options ask for.
@@ -170,7 +172,14 @@ def load_silhouette(
     shape = mask.shape
     mask, how_padded = cleaning.square(mask)
     notes = (*picture.notes, *how_found, *how_cleaned, *how_padded)
-    return Silhouette(mask, picture.name if name is None else name, notes, (shape[0], shape[1]))
+    return Silhouette(mask, _own_name(picture.name, mask) if name is None else name, notes, (shape[0], shape[1]))
+
+
+def _own_name(name: str, mask: BoolArray) -> str:
+    """The name of a picture; one that has none, such as an array, is named after its pixels."""
+    if name != NAMELESS:
+        return name
+    return f"silhouette-{hashlib.sha256(repr(mask.shape).encode() + np.packbits(mask).tobytes()).hexdigest()[:8]}"
 
 
 def _first_object(source: ImageSource, options: ObjectOptions) -> tuple[Picture, BoolArray, list[str]]:

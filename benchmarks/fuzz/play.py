@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 
 from autopoly_env.errors import IllegalActionError
-from autopoly_env.mesh import defects_of
+from autopoly_env.mesh import FaceRule, defects_of
 from autopoly_env.operators import Action
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator
@@ -27,7 +27,7 @@ class Played:
     n_steps: int = 0
     n_without_room: int = 0  # actions that were tried and refused
     n_crossed: int = 0  # states with a crossing
-    n_flipped: int = 0  # states with a flipped or empty face
+    n_flipped: int = 0  # states with a flipped or empty face, or one against the rule
 
     def __add__(self, other: "Played") -> "Played":
         return Played(*(a + b for a, b in zip(vars(self).values(), vars(other).values(), strict=True)))
@@ -40,10 +40,14 @@ def _target(number: int) -> Silhouette:
     return source.sample(number)
 
 
-def play(operators: str, seed: int) -> Played:
-    """One episode of random actions with a preset; each operator is as likely, whatever the number of its elements."""
+def play(operators: str, seed: int, faces: FaceRule = "any") -> Played:
+    """One episode of random actions, with a preset and under a rule of faces.
+
+    Each operator is as likely, whatever the number of its elements.
+    """
     rng = np.random.default_rng(seed)
-    simulator = Simulator(_target(seed % N_TARGETS), operators=operators, resolution=RESOLUTION, max_steps=N_STEPS)
+    target = _target(seed % N_TARGETS)
+    simulator = Simulator(target, operators=operators, resolution=RESOLUTION, max_steps=N_STEPS, faces=faces)
     state, played = simulator.initial(), Played(n_episodes=1)
     while not state.done and len(state.mesh.vertices) < N_VERTICES:
         by_operator: dict[str, list[Action]] = {}
@@ -58,11 +62,11 @@ def play(operators: str, seed: int) -> Played:
             played.n_without_room += 1
             state = simulator.idle(state)
             continue
-        crossings, flipped = defects_of(state.mesh)
+        crossings, flipped = defects_of(state.mesh, faces)
         played += Played(0, 1, 0, crossings > 0, flipped > 0)
     return played
 
 
-def play_many(operators: str, n: int, seed: int) -> Played:
+def play_many(operators: str, n: int, seed: int, faces: FaceRule = "any") -> Played:
     """Episodes number `seed` to `seed` + n - 1."""
-    return sum((play(operators, seed + k) for k in range(n)), Played())
+    return sum((play(operators, seed + k, faces) for k in range(n)), Played())

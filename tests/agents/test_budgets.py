@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from agents.base import Agent, Decision
-from agents.budget import MOST_STATES, STATES_A_REFIT, Budget, Meter, Progress
+from agents.budget import MOST_STATES, STATES_A_REFIT, Budget, Foresight, Meter, Progress
 from agents.contract import solved
 from agents.registry import make_agent
 from agents.solution import OVER_BUDGET, Solution
@@ -105,6 +105,17 @@ def test_tree__is_bounded_whatever_the_budget_is() -> None:
     meter = Meter.unlimited()
     meter.add_simulation(MOST_STATES)
     assert meter.spent() and meter.stopped_by == "states"
+
+
+def test_foresight__counts_its_states_where_they_cost_memory_and_reports_none_of_its_shapes() -> None:
+    reported: list[Progress] = []
+    whole = Meter(Budget(refits=2), reported.append)
+    first, second = Foresight(whole), Foresight(whole)
+    for ahead in (first, second):
+        ahead.add_simulation(STATES_A_REFIT)
+        ahead.count(0, 1e6)
+    assert second.spent() and whole.spent() and whole.stopped_by == "states"
+    assert (reported, whole.stats().n_refits) == ([], 0)
 
 
 @pytest.mark.parametrize("value", [1.5, -1, "3", float("nan"), -(10**400)])

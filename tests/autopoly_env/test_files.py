@@ -22,6 +22,16 @@ def test_write__makes_folders_and_replaces_what_was_there(tmp_path: Path, data: 
     assert [p.name for p in path.parent.iterdir()] == ["file"]
 
 
+def test_write__sweeps_up_what_a_killed_process_has_left_half_written(tmp_path: Path) -> None:
+    old, fresh, other = (tmp_path / name for name in (".0123456789ab.tmp", ".ba9876543210.tmp", ".mine.tmp"))
+    for path in (old, fresh, other):
+        path.touch()
+    for path in (old, other):
+        os.utime(path, (0, 0))
+    write_atomically(tmp_path / "file", "text")
+    assert sorted(path.name for path in tmp_path.iterdir()) == [".ba9876543210.tmp", ".mine.tmp", "file"]
+
+
 def test_write__follows_a_link(tmp_path: Path) -> None:
     (tmp_path / "folder").mkdir()
     link = tmp_path / "latest"

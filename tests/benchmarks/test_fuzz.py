@@ -5,6 +5,8 @@ import json
 import numpy as np
 import pytest
 
+from autopoly_env.mesh import FaceRule
+from benchmarks.fuzz.__main__ import GAMES
 from benchmarks.fuzz.inputs import DOORS
 from benchmarks.fuzz.odd import VALUES, damaged, mutated, places_in
 from benchmarks.fuzz.play import play_many
@@ -25,9 +27,11 @@ def test_odd_inputs__are_accepted_or_refused_in_one_tame_line(name: str) -> None
 
 
 @pytest.mark.slow  # 40 episodes
-@pytest.mark.parametrize("operators", ["paper", "full"])
-def test_random_play__never_ends_a_legal_action_in_a_crossing_or_a_flipped_face(operators: str) -> None:
-    played = play_many(operators, 40, 300)
+@pytest.mark.parametrize("operators, faces", GAMES)
+def test_random_play__never_ends_a_legal_action_in_a_crossing_or_a_flipped_face(
+    operators: str, faces: FaceRule
+) -> None:
+    played = play_many(operators, 40, 300, faces)
     assert (played.n_episodes, played.n_crossed, played.n_flipped) == (40, 0, 0)
     assert played.n_steps > 300
 

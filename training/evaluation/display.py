@@ -10,8 +10,9 @@ from agents.commands.screen import say
 from autopoly_env.shown import tame
 from training.evaluation.tasks import EvalTask
 from training.records import Record
+from training.telling import Pulse
 
-SECONDS_A_LINE = 30.0  # where there is no terminal
+SECONDS_A_LINE = 4.0  # where there is no terminal
 MOST_FAILURES = 20  # that are told one by one
 MOST_NAMES = 2  # of tasks in work
 
@@ -25,16 +26,21 @@ class Display:
         self._console = Console(stderr=True)
         self._bar = progress_bar(n_tasks, n_done=n_done, is_hidden=quiet, shows_left=True, console=self._console)
         self._n_tasks, self._n_done, self._n_new = n_tasks, n_done, 0
-        self._began = self._said = time.monotonic()
+        self._began = time.monotonic()
+        self._pulse = None if quiet or self._console.is_terminal else Pulse(self._stands, SECONDS_A_LINE)
         self._in_work: dict[tuple[str, str, int], None] = {}
         self._sums: defaultdict[str, float] = defaultdict(float)
         self._counts: Counter[str] = Counter()
 
     def __enter__(self) -> "Display":
         self._bar.start()
+        if self._pulse is not None:
+            self._pulse.__enter__()
         return self
 
     def __exit__(self, *_: object) -> None:
+        if self._pulse is not None:
+            self._pulse.__exit__()
         self._bar.stop()
 
     def begun(self, task: EvalTask) -> None:
@@ -55,14 +61,15 @@ class Display:
             self._sums[record.agent] += record.outcome.r_all
             self._counts[record.agent] += 1
         self._bar.update(TASK, completed=self._n_done, description=self._text())
-        now = time.monotonic()
-        if not self._console.is_terminal and not self._quiet and now - self._said >= SECONDS_A_LINE:
-            self._said = now
-            left = (now - self._began) / self._n_new * (self._n_tasks - self._n_done)
-            self._say(f"{self._n_done} of {self._n_tasks} done, {left:.0f} s left; {self._text()}")
+
+    def _stands(self) -> str:
+        """What a line says where there is no bar."""
+        spent = time.monotonic() - self._began
+        left = f", {spent / self._n_new * (self._n_tasks - self._n_done):.0f} s left" if self._n_new else ""
+        return f"{self._n_done} of {self._n_tasks} done{left}; {self._text()}"
 
     def _text(self) -> str:
-        names = [f"{label} on {target}" for label, target, _ in self._in_work]
+        names = [f"{label} on {target}" for label, target, _ in list(self._in_work)]
         more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
         parts = [", ".join(names[:MOST_NAMES]) + more] if names else []
         if self._counts:

@@ -13,6 +13,7 @@ from agents.guided.weights import SHIPPED, save_weights
 from autopoly_env.files import write_atomically
 from training.networks.cost import cost
 from training.networks.trainer import TrainingTask
+from training.telling import table_of
 
 _ABOUT = {
     "nfap": "nFAP-Net: from the rendering of a mesh and a target silhouette to the next actions and where they work.",
@@ -36,7 +37,7 @@ def finish_run(task: TrainingTask, settings: dict[str, Any], folder: Path, devic
     report = {"metrics": metrics, "cost": work, "settings": settings}
     write_atomically(folder / "report.json", json.dumps(report, indent=2) + "\n")
     path = save_weights(folder / f"{task.name}.safetensors", task.net, settings, metrics)  # type: ignore[arg-type]
-    print(f"{path}: " + ", ".join(f"{name} {value:.4g}" for name, value in metrics.items()))
+    print(f"{path}, on the held-out samples:\n{table_of(metrics)}")
     if export:
         save_weights(SHIPPED / f"{task.name}.safetensors", task.net, settings, metrics)  # type: ignore[arg-type]
         card = write_atomically(SHIPPED / f"{task.name}.md", _card(task, settings, metrics, work))

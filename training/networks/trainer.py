@@ -6,8 +6,9 @@ bit for bit. Letters: B batch, W processes (under torchrun), each with its own B
 
 import math
 import os
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
@@ -22,8 +23,9 @@ from autopoly_env.arrays import ByteArray
 from autopoly_env.errors import ConfigError, RunError
 from autopoly_env.files import write_atomically
 from training.networks.streams import Batch, batches
-from training.options import check_same_run
+from training.options import check_same_run, claim_run
 from training.run_log import RunLog
+from training.telling import Pulse, duration
 
 _HARMLESS = ("n_workers", "n_threads", "device", "log_every", "save_every")  # a run may go on with other ones
 
@@ -139,7 +141,7 @@ def process_of(config: RunConfig) -> Iterator[Process]:
 
 @dataclass
 class _Progress:
-    """Where a run stands."""
+    """Where a run stands; a checkpoint has all of it."""
 
     step: int = 0
     best_loss: float = math.inf
@@ -163,23 +165,50 @@ def train(
     log = RunLog(folder, progress.step) if process.leads else None
     if log is not None and progress.step:
         print(f"{folder}: goes on at step {progress.step}", flush=True)
+    if log is not None:
+        print(_banner(task, optim, run, folder, process, progress), flush=True)
     stream = batches(task.stream, optim.batch_size, run.n_workers, progress.step, process.rank, process.n_ranks)
-    while progress.step < optim.n_steps and progress.n_worse < run.patience:
-        step = progress.step
-        batch = {name: tensor.to(process.device, non_blocking=True) for name, tensor in next(stream).items()}
-        terms = _update(losses, optimizer, batch, optim, step)
-        if not math.isfinite(terms["loss"]):
-            raise RunError(_broken(terms, run.seed, step, optim.batch_size, process))
-        progress.step = step + 1
-        if log is not None and progress.step % run.log_every == 0:
-            log.write(progress.step, "train", {**terms, "lr": optim.lr_at(step)})
-        if progress.step % run.eval_every == 0 or progress.step == optim.n_steps:
-            _measure(task, progress, log, process)
-        if process.leads and (progress.step % run.save_every == 0 or progress.step == optim.n_steps):
-            _save(task, optimizer, progress, settings, folder)
+    began, first = time.monotonic(), progress.step
+    with ExitStack() as stack:
+        if log is not None:
+            stack.enter_context(Pulse(lambda: f"step {progress.step} of {optim.n_steps}"))
+        while progress.step < optim.n_steps and progress.n_worse < run.patience:
+            step = progress.step
+            batch = {name: tensor.to(process.device, non_blocking=True) for name, tensor in next(stream).items()}
+            terms = _update(losses, optimizer, batch, optim, step)
+            if not math.isfinite(terms["loss"]):
+                raise RunError(_broken(terms, run.seed, step, optim.batch_size, process))
+            progress.step = step + 1
+            if log is not None and progress.step % run.log_every == 0:
+                log.write(progress.step, "train", {**terms, "lr": optim.lr_at(step)})
+                pace = (time.monotonic() - began) / (progress.step - first)
+                left = duration(pace * (optim.n_steps - progress.step))
+                print(
+                    f"step {progress.step}: loss {terms['loss']:.4g}, {optim.batch_size / pace:.0f} samples a second, "
+                    f"{left} left at most",
+                    flush=True,
+                )
+            if progress.step % run.eval_every == 0 or progress.step == optim.n_steps:
+                _measure(task, progress, log, process)
+            if process.leads and (progress.step % run.save_every == 0 or progress.step == optim.n_steps):
+                _save(task, optimizer, progress, settings, folder)
     if process.leads:
         _save(task, optimizer, progress, settings, folder)
     task.net.load_state_dict(progress.best)
+
+
+def _banner(
+    task: TrainingTask, optim: OptimConfig, run: RunConfig, folder: Path, process: Process, progress: _Progress
+) -> str:
+    """What is about to happen."""
+    n_weights = sum(p.numel() for p in task.net.parameters())
+    due = run.eval_every - progress.step % run.eval_every
+    return (
+        f"{task.name} in {folder}: {n_weights:,} parameters on {process.device}, {optim.n_steps - progress.step} steps "
+        f"of {optim.batch_size * process.n_ranks} samples made by {max(1, run.n_workers)} processes\n"
+        f"measured on held-out samples every {run.eval_every} steps, first in {min(due, optim.n_steps)}; it ends after "
+        f"{run.patience} measurements in a row that are no better"
+    )
 
 
 def _update(
@@ -217,7 +246,10 @@ def _measure(task: TrainingTask, progress: _Progress, log: RunLog | None, proces
             log.picture(progress.step, task.draw(process.device))
         task.net.train()
         loss.fill_(metrics["loss"])
-        print(f"step {progress.step}: " + ", ".join(f"{k} {v:.4g}" for k, v in metrics.items()), flush=True)
+        best = f"the best was {progress.best_loss:.4g}" if math.isfinite(progress.best_loss) else "the first"
+        print(
+            f"step {progress.step}: held-out loss {metrics['loss']:.4g} ({best}); all metrics in log.jsonl", flush=True
+        )
     if process.n_ranks > 1:
         dist.broadcast(loss, 0)
     if not math.isfinite(float(loss)):
@@ -260,6 +292,8 @@ def _resume(
     """Put everything as the folder's checkpoint has it, if there is one."""
     path = _checkpoint(folder)
     if not path.exists():
+        if process.leads:
+            claim_run(folder, settings, _HARMLESS)
         return
     try:
         state = torch.load(path, map_location=process.device, weights_only=True)

@@ -129,6 +129,11 @@ def mean_final(metrics: Mapping[str, Metrics]) -> float:
     return float(np.mean([one.final for one in metrics.values()]))
 
 
+def mean_start(metrics: Mapping[str, Metrics]) -> float:
+    """The mean r_all of the rectangles, each evaluation weighing the same."""
+    return float(np.mean([one.start for one in metrics.values()]))
+
+
 def flat(metrics: Mapping[str, Metrics]) -> dict[str, float]:
     """The metrics by the names EVALUATION_METRIC, as logs and weights keep them."""
     return {f"{name}_{key}": value for name, one in metrics.items() for key, value in vars(one).items()}

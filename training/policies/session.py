@@ -5,6 +5,7 @@ The parts are the log, the curriculum, the evaluation that keeps the best policy
 """
 
 import math
+import time
 from dataclasses import asdict
 from pathlib import Path
 
@@ -22,9 +23,10 @@ from agents.rl.weights import save_policy
 from autopoly_env.errors import RunError
 from training.options import plain
 from training.policies.config import TrainRlConfig
-from training.policies.evaluation import evaluate, evaluations_of, flat, mean_final, summary
+from training.policies.evaluation import evaluate, evaluations_of, flat, mean_final, mean_start, summary
 from training.policies.run_state import LearningRate, RunState
 from training.policies.training_log import TrainingLog
+from training.telling import duration
 
 
 class Curriculum:
@@ -56,6 +58,10 @@ class BestPolicy:
         """Whether it is time for an evaluation."""
         return state.step - self._last >= self._config.run.eval_every
 
+    def steps_left(self, state: RunState) -> int:
+        """Until the next evaluation."""
+        return max(0, self._last + self._config.run.eval_every - state.step)
+
     def is_behind(self, state: RunState) -> bool:
         """Whether the policy of this step has not been evaluated, or none was kept."""
         return self._last < state.step or not math.isfinite(state.best)
@@ -64,14 +70,14 @@ class BestPolicy:
         """Let the policy build the held-out targets, and note how good it is."""
         self._last = state.step
         metrics = evaluate(self._evaluations, net)
-        values = {"final": mean_final(metrics), **flat(metrics)}
+        values = {"final": mean_final(metrics), "start": mean_start(metrics), **flat(metrics)}
         log.write_evaluation(state, values)
         if values["final"] > state.best:
-            state.best, state.best_step = values["final"], state.step
+            state.best, state.best_step, state.rectangle = values["final"], state.step, values["start"]
             settings = plain(self._config)
             kept = {"step": state.step, **values}
             save_policy(self._folder / "policy.safetensors", net, self._config.algorithm, settings, kept)
-        print(f"step {state.step}, {state.seconds / 60.0:.1f} min: {summary(metrics)}", flush=True)
+        print(f"step {state.step}, {state.seconds / 60.0:.1f} min: exam: {summary(metrics)}", flush=True)
 
 
 class Checkpoints:
@@ -92,6 +98,7 @@ class Checkpoints:
         note = {
             **asdict(state),
             "best": state.best if math.isfinite(state.best) else None,
+            "rectangle": None,
             "algorithm": self._config.algorithm,
             "spec": plain(self._config.env.spec()),
             "net": plain(self._config.net),
@@ -111,24 +118,43 @@ class Session(BaseCallback):
         self.best = BestPolicy(config, folder, state)
         self.checkpoints = Checkpoints(config, folder, state)
         self.bar: Progress | None = None  # of steps
+        self.is_timed = False  # whether the clock is running, and not an exam or saving
+        self._exam_seconds = self._update_seconds = 0.0  # that the last ones took
+        self._told = -math.inf  # when there was a line of an update
 
     @property
     def is_over(self) -> bool:
-        """Whether the budget of steps or minutes is spent."""
-        return self.state.share_done(self.config.run) >= 1.0
+        """Whether the budget of steps or minutes is spent, or is by the time that the last exam is done."""
+        return self.state.share_done(self.config.run) >= 1.0 or self._is_late()
+
+    def _is_late(self) -> bool:
+        minutes = self.config.run.minutes
+        spent = self.state.seconds + (self.log.clock.running() if self.is_timed else 0.0)
+        return bool(minutes) and spent + self._exam_seconds + self._update_seconds >= 60.0 * minutes
+
+    def stands(self) -> str:
+        """Where the training stands, in a few words."""
+        state = self.state
+        spent = state.seconds + (self.log.clock.running() if self.is_timed else 0.0)
+        what = "" if self.is_timed else ", exam or saving"
+        return f"step {max(state.step, self.num_timesteps)} of {self.config.run.total_steps}, {duration(spent)}{what}"
 
     def _on_training_start(self) -> None:
         if self.config.run.init and not math.isfinite(self.state.best):
             self._evaluate()  # what it begins with is the best so far
         self.log.clock.start()
+        self.is_timed = True
 
     def _on_rollout_start(self) -> None:
         """After an update, or at the very beginning."""
         state = self.state
-        state.seconds += self.log.clock.stop_update()
+        self.is_timed = False
+        self._update_seconds = self.log.clock.stop_update()
+        state.seconds += self._update_seconds
         state.step, state.n_updates = self.num_timesteps, int(getattr(self.model, "_n_updates", 0))
         self.lr.done = state.share_done(self.config.run)
         self.curriculum.apply(self.training_env, self.lr.done)
+        self._tell()
         if self.log.is_due(state):
             self.log.write(state, self.lr(), self.model.logger.name_to_value)
         if self.best.is_due(state):
@@ -136,6 +162,18 @@ class Session(BaseCallback):
         if self.checkpoints.is_due(state):
             self.checkpoints.save(self.model, state)
         self.log.clock.start(self._env_seconds())
+        self.is_timed = True
+
+    def _tell(self) -> None:
+        """A line at each update, though not more than one a second."""
+        state, speed = self.state, self.log.clock.steps_per_second
+        if state.step == 0 or time.monotonic() - self._told < 1.0:
+            return
+        self._told = time.monotonic()
+        line = f"step {state.step}, {duration(state.seconds)}: {speed:.0f} steps a second"
+        if speed > 0.0:
+            line += f", exam in {duration(self.best.steps_left(state) / speed)}"
+        print(f"{line}; {self.log.recent()}", flush=True)
 
     def _on_step(self) -> bool:
         self.log.add(self.locals["infos"])
@@ -161,11 +199,20 @@ class Session(BaseCallback):
             )
 
     def _evaluate(self) -> None:
+        began = time.monotonic()
         self.best.evaluate(net_of(self.model.policy), self.state, self.log)
+        self._exam_seconds = time.monotonic() - began
+        self.state.seconds += self._exam_seconds
 
     def end(self) -> None:
         """What is due when the training is over."""
+        if self.is_timed:
+            self.state.seconds += self.log.clock.running()
+            self.is_timed = False
+        is_late = self._is_late()
         self.state.step = self.model.num_timesteps
         if self.best.is_behind(self.state):
             self._evaluate()
+        if is_late:  # what is left is too little to go on with
+            self.state.seconds = max(self.state.seconds, 60.0 * self.config.run.minutes)
         self.checkpoints.save(self.model, self.state)

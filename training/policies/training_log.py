@@ -52,6 +52,15 @@ class Clock:
         spent, self._began = now - self._began, now
         return spent
 
+    def running(self) -> float:
+        """Seconds since it was started or stopped last."""
+        return time.perf_counter() - self._began
+
+    @property
+    def steps_per_second(self) -> float:
+        """Of what was counted since the log's last line; 0 before anything was."""
+        return self._n_steps / max(self._rollout + self._update, 1e-9)
+
     def shares(self) -> dict[str, float]:
         """Steps a second, and shares of the time: environments, the policy's own inference, updates."""
         whole = max(self._rollout + self._update, 1e-9)
@@ -89,6 +98,11 @@ class TrainingLog:
         values |= {name: value for name, value in self.clock.shares().items() if math.isfinite(value)}
         self._log.write(state.step, "train", values | self._means())
         self.clock.reset()
+
+    def recent(self) -> str:
+        """The last episodes in words."""
+        means = self._means()
+        return f"last episodes: r_all {means['final_r_all']:.2f}" if means else "no episode has ended yet"
 
     def _means(self) -> dict[str, float]:
         """Over the last episodes; empty where there were none."""

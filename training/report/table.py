@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rich import box
+from rich.cells import cell_len
 from rich.table import Table
 from rich.text import Text
 
@@ -94,6 +95,32 @@ def as_rich(heads: Sequence[str], lines: Sequence[Line]) -> Table:
         parts = (map(tame, filter(None, (cell.text, cell.detail))) for cell in line.cells)
         drawn.add_row(*(Text("\n".join(part), style) for part in parts))
     return drawn
+
+
+def as_rich_parts(heads: Sequence[str], lines: Sequence[Line], width: int) -> list[Table]:
+    """The table for a screen of so many letters, in parts that each begin with the first column; nothing is cut.
+
+    The first column is folded where it takes more than a third of the screen. A part has one column more at least.
+    """
+    widths = [max(map(cell_len, [head, *_texts(lines, k)])) + 2 for k, head in enumerate(heads)]
+    first = min(widths[0], max(12, width // 3))
+    parts: list[list[int]] = []
+    used = width
+    for k in range(1, len(heads)):
+        if not parts or used + widths[k] > width:
+            parts.append([])
+            used = first + 1  # with a margin
+        parts[-1].append(k)
+        used += widths[k]
+    chosen = [[0, *part] for part in parts] or [[0]]
+    return [
+        as_rich([heads[k] for k in part], [Line([line.cells[k] for k in part], line.is_quoted) for line in lines])
+        for part in chosen
+    ]
+
+
+def _texts(lines: Sequence[Line], k: int) -> list[str]:
+    return [tame(text) for line in lines for text in (line.cells[k].text, line.cells[k].detail)]
 
 
 def as_markdown(heads: Sequence[str], lines: Sequence[Line]) -> str:

@@ -339,6 +339,16 @@ def test_mcts_with_networks__refits_only_what_it_commits(weights: dict[str, str]
     assert solution.stats.n_refits <= 2 + 2 * 3  # two rectangles, then at most three starts for each of two steps
 
 
+@pytest.mark.slow
+def test_mcts_with_networks__ends_where_its_simulations_do_not(weights: dict[str, str]) -> None:
+    """Warps cost no refit, so that a budget of refits alone would be no bound."""
+    agent = make_agent(
+        "nfap-mcts", nfap_weights=weights["nfap"], warpnet_weights=weights["warpnet"], n=2, n_simulations=10**9
+    )
+    assert agent.solve(game(BOTTLE), Budget(refits=1)).stats.stopped_by in ("refits", "states")
+    assert agent.solve(game(BOTTLE), Budget(seconds=0.5)).stats.stopped_by == "seconds"
+
+
 @pytest.mark.parametrize("name", ["nfap-prior", "nfap-mcts"])
 def test_agent__leaves_locked_vertices_where_they_are(name: str, weights: dict[str, str]) -> None:
     start = PolyMesh.rectangle(0.3, 0.3, 0.7, 0.7)

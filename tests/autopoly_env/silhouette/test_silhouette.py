@@ -90,7 +90,7 @@ def test_target__prefix_sums_start_at_zero_and_end_at_the_row_total() -> None:
     assert target.row_sum.tolist() == [[0, 0.5, 0.75], [0, 0, 1]]
     assert target.row_square_sum.tolist() == [[0, 0.25, 0.3125], [0, 0, 1]]
     assert target.mask_sum.tolist() == [[0, 1, 1], [0, 0, 1]]
-    assert target.mask_sum.dtype == np.int64
+    assert target.mask_sum.dtype == np.float64
     assert target.resolution == 2 and repr(target) == "Target(resolution=2)"
 
 
@@ -313,7 +313,11 @@ def test_load__names_a_silhouette_after_its_file_unless_told(tmp_path: Path) -> 
     with path.open("rb") as stream, Image.open(path) as image:
         assert load_silhouette(stream).name == load_silhouette(image).name == "chair"
     assert load_silhouette(path, name="stool").name == "stool"
-    assert load_silhouette(l_shape()).name == "silhouette"
+    path = path.rename(path.with_stem("silhouette"))
+    assert load_silhouette(path).name == "silhouette"
+    own = load_silhouette(l_shape()).name
+    assert own.startswith("silhouette-") and own == load_silhouette(l_shape()).name
+    assert own != load_silhouette(l_shape()[::-1]).name
 
 
 # --- large pictures ---

@@ -1,0 +1,62 @@
+"""What trainings say: signs of life, settings with what they mean, metrics beside what they are measured against."""
+
+import threading
+
+import pytest
+
+from training.networks.labelling import SourceConfig
+from training.policies.clone_samples import CloneConfig
+from training.policies.config import TrainRlConfig
+from training.policies.run_state import RunState
+from training.telling import Pulse, duration, settings_of, table_of
+from training.train_nfap import TrainNfapConfig
+from training.train_warpnet import TrainWarpnetConfig
+
+
+@pytest.mark.parametrize("kind", [TrainRlConfig, CloneConfig, TrainNfapConfig, TrainWarpnetConfig, SourceConfig])
+def test_settings__are_all_listed_and_can_be_given_as_they_are_named(kind: type) -> None:
+    lines = [line for line in settings_of(kind()) if line and not line.startswith("#")]
+    names = [line.partition(" = ")[0] for line in lines]
+    assert len(names) == len(set(names)) > 3 and all(" = " in line for line in lines)
+    assert all("\n" not in line for line in lines)
+
+
+def test_settings__say_what_they_mean() -> None:
+    lines = settings_of(TrainRlConfig())
+    assert "run.eval_every = 50000  # steps" in lines
+    assert "ppo.n_steps = 64  # of each environment between updates" in lines
+    assert "# ppo: SB3's own arguments of PPO and MaskablePPO." in lines
+
+
+def test_pulse__says_where_things_stand_when_nothing_else_was_said(capsys: pytest.CaptureFixture[str]) -> None:
+    asked = threading.Event()
+
+    def stands() -> str:
+        asked.set()
+        return "step 3 of 9"
+
+    with Pulse(stands, every=0.01):
+        assert asked.wait(30.0)
+    assert "... step 3 of 9" in capsys.readouterr().err
+
+
+def test_pulse__keeps_still_while_others_speak(capsys: pytest.CaptureFixture[str]) -> None:
+    with Pulse(lambda: "nothing new", every=1000.0) as pulse:
+        pulse.say("step 1")
+    said = capsys.readouterr()
+    assert (said.out, said.err) == ("step 1\n", "")
+
+
+def test_metrics__stand_beside_their_baselines() -> None:
+    table = table_of({"loss": 0.5, "top3": 0.75, "top3_residual": 0.5, "top3_chance": 0.125, "choice": 1.0})
+    rows = [line.split(None, 2) for line in table.splitlines()]
+    assert rows[1:] == [["loss", "0.5"], ["top3", "0.75", "residual 0.5, chance 0.125"], ["choice", "1"]]
+
+
+def test_policy__that_is_worth_no_more_than_the_rectangle_has_not_learnt() -> None:
+    assert RunState(best=60.0, rectangle=50.0).has_learnt
+    assert not RunState(best=50.0, rectangle=50.0).has_learnt
+
+
+def test_duration__is_in_words() -> None:
+    assert [duration(seconds) for seconds in (3.4, 204.0, 7560.0)] == ["3 s", "3.4 min", "2.1 h"]
