@@ -213,7 +213,7 @@
     byId("what").textContent = step.title;
     byId("done").textContent = step.done;
     byId("seconds").textContent = k === 0 ? "" : `, about ${step.seconds.toFixed(0)} s`;
-    byId("keys").replaceChildren(...step.keys.map(text => make("li", {}, ...keysOf(text))));
+    byId("keys").replaceChildren(...step.lines.map(line => make("li", {}, ...keysOf(line.words))));
     byId("menu").replaceChildren(make("span", {}, step.menu), make("code", {}, step.blender));
     set(slider, { "aria-valuetext": `${which}, ${step.title}` });
     slider.value = k;
