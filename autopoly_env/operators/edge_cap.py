@@ -97,6 +97,7 @@ edge_cap = Operator(
         "Edge › Extrude Edges, then Mesh › Merge › At Center",
         "mesh.merge",
         lambda _: Gesture("KPBBKPBB", drags=True),
+        "The shape runs out to a point here.",
     ),
     blender=_blender,
 )

@@ -76,6 +76,7 @@ edge_dissolve = Operator(
         "Mesh › Delete › Dissolve Edges",
         "mesh.dissolve_edges",
         lambda _: Gesture("KK"),
+        "The edge is inside the shape and not needed.",
     ),
     blender=_blender,
 )

@@ -180,6 +180,7 @@ edge_fill = Operator(
         "Vertex › New Edge/Face from Vertices",
         "mesh.edge_face_add",
         lambda _: Gesture("K", n_selected=2),
+        "Between the two edges is shape, too.",
     ),
     blender=_blender,
 )

@@ -66,6 +66,7 @@ face_delete = Operator(
         "Mesh › Delete › Faces",
         "mesh.delete",
         lambda _: Gesture("KPBB"),
+        "There is no shape here.",
     ),
     blender=_blender,
 )

@@ -231,6 +231,8 @@ face_hole = Operator(
     promise=_promise,
     mirror=_mirror,
     sources=_sources,
-    phrases=Phrases("Cut a hole", _done, _deeds, "Mesh › Knife Tool", "mesh.knife_tool", _gesture),
+    phrases=Phrases(
+        "Cut a hole", _done, _deeds, "Mesh › Knife Tool", "mesh.knife_tool", _gesture, "The picture has a hole here."
+    ),
     blender=_blender,
 )

@@ -116,6 +116,7 @@ face_inset = Operator(
         "Face › Inset Faces",
         "mesh.inset",
         lambda _: Gesture("KPBB"),
+        "A ring of quads makes room for a smaller face inside.",
     ),
     blender=_blender,
 )

@@ -106,6 +106,7 @@ face_split = Operator(
         "Vertex › Connect Vertex Path",
         "mesh.vert_connect_path",
         lambda _: Gesture("K", n_selected=2),
+        "Each half of the face can change on its own now.",
     ),
     blender=_blender,
 )

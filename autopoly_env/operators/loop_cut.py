@@ -212,6 +212,7 @@ loop_cut = Operator(
         "Edge › Loop Cut and Slide",
         "mesh.loopcut_slide",
         lambda _: Gesture("KKPBBPBB"),
+        "New corners let the shape bend between the ends of the strip.",
     ),
     blender=_blender,
 )

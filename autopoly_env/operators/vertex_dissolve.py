@@ -77,6 +77,7 @@ vertex_dissolve = Operator(
         "Mesh › Delete › Dissolve Vertices",
         "mesh.dissolve_verts",
         lambda _: Gesture("KK"),
+        "The outline is straight enough without this vertex.",
     ),
     blender=_blender,
 )

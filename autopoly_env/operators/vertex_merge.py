@@ -191,6 +191,7 @@ vertex_merge = Operator(
         "Mesh › Merge › At Last",
         "mesh.merge",
         lambda _: Gesture("KPBB", n_selected=2),
+        "The gap between the two corners closes.",
     ),
     blender=_blender,
 )

@@ -63,6 +63,7 @@ class Phrases:
     menu: str  # where Blender has the same in its menus
     blender: str  # the name of Blender's operator
     gesture: Callable[[Told], Gesture] = from_a_menu  # what `keys` cost the hand (docs/lessons.md)
+    why: str = ""  # what it is good for, a sentence
 
 
 def element_words(step: Told) -> str:

@@ -6,12 +6,15 @@ from typing import Any
 import numpy as np
 
 from autopoly_env.errors import AutoPolyError
-from autopoly_env.export.byhand.hand import DIGITS, Hand, Line, Making, Place, is_close, way
+from autopoly_env.export.byhand import saying
+from autopoly_env.export.byhand.hand import DIGITS, SEEN, Hand, Line, Making, Place, is_close, way
+from autopoly_env.export.byhand.reasons import reason
 from autopoly_env.export.byhand.starting import begin
 from autopoly_env.export.replay import finite_meshes
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import HoleChoice, Operator
-from autopoly_env.sequence import ConstructionSequence, Step
+from autopoly_env.operators import HoleChoice, Operator, operator_named
+from autopoly_env.operators.deeds import Cut, Ids, Loop, Selection
+from autopoly_env.sequence import ConstructionSequence, Step, parts_of
 from autopoly_env.sequence.ids import decoded
 
 
@@ -22,6 +25,8 @@ class Card:
     operator: str  # "start" for the first card
     lines: tuple[Line, ...]
     aims: dict[int, Place]  # the vertices that are placed, and where: Blender's units, y up
+    picks: tuple[str, ...] = ()  # what is clicked of the mesh before the step: "edge 0–1", "vertex 4", "face 3"
+    why: str = ""  # what the step is good for
 
 
 def cards_of(sequence: ConstructionSequence) -> list[Card]:
@@ -29,14 +34,38 @@ def cards_of(sequence: ConstructionSequence) -> list[Card]:
     meshes = finite_meshes(sequence)
     hand = Hand()
     begin(hand, meshes[0], _places(meshes[0]))
+    parts = parts_of(sequence)
     cards = [Card("start", _taken(hand), _places(meshes[0]))]
-    for step, before, after in zip(sequence.steps, meshes, meshes[1:], strict=False):
+    for number, (step, before, after) in enumerate(zip(sequence.steps, meshes, meshes[1:], strict=False), 1):
         known = dict(hand.places)
         _follow(hand, step, before, after)
         wanted = _places(after)
-        aims = {v: wanted[v] for v in hand.places if v not in known or hand.places[v] != known[v]}
-        cards.append(Card(step.operator, _taken(hand), aims))
+        aims = {v: place for v, place in wanted.items() if v not in known or _is_seen(known[v], hand.places[v])}
+        why = reason(number, step, before, after, parts)
+        cards.append(Card(step.operator, _taken(hand), aims, _picks(step, before), why))
     return cards
+
+
+def _picks(step: Step, before: PolyMesh) -> tuple[str, ...]:
+    """What is pointed at of the mesh before a step."""
+    picked: list[tuple[str, Ids]] = []
+    for deed in operator_named(step.operator).told.keys(step):
+        match deed:
+            case Selection():
+                picked += [(deed.kind, ids) for ids in deed.elements if deed.kind != "face" or len(ids) == 1]
+            case Loop():
+                picked.append(("edge", deed.edge))
+            case Cut():
+                old = set(before.vertex_ids)
+                picked += [("vertex", (v,)) for path in deed.paths for v in path if v in old]
+            case str():
+                kind, ids = next(iter(step.element.items()))
+                picked.append((kind, tuple(ids) if isinstance(ids, list) else (ids,)))
+    return tuple(dict.fromkeys(saying.element(kind, tuple(sorted(ids))) for kind, ids in picked))
+
+
+def _is_seen(a: Place, b: Place) -> bool:
+    return max(abs(a[0] - b[0]), abs(a[1] - b[1])) >= SEEN
 
 
 def _taken(hand: Hand) -> tuple[Line, ...]:

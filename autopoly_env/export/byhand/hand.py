@@ -18,6 +18,7 @@ from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators.deeds import Cut, Deed, Ids, Loop, Press, Pull, Selection
 
 DIGITS = 3  # of a distance that is typed, in units of the unit square
+SEEN = 0.005  # units; who drags by eye need not care for less
 CLOSE = 0.0007  # of a coordinate; a vertex that is so near to its place stays
 MODE_KEYS = {"vertex": "1", "edge": "2", "face": "3"}
 
@@ -149,7 +150,8 @@ class Hand:
         self.note({"do": "drag", "keys": ["G"], "by": by})
         name = self.called(vertices[0]) if len(vertices) > 1 else "it"
         doing = "move them" if len(vertices) > 1 else "move it"
-        self.end_line(f"{words}; {saying.drag('G', doing, name, self.places[vertices[0]], by)}")
+        seen = "" if max(map(abs, by)) >= SEEN else " (hardly to be seen)"
+        self.end_line(f"{words}; {saying.drag('G', doing, name, self.places[vertices[0]], by)}{seen}")
 
     def grow(self, key: str, vertex: int, to: Place) -> None:
         """A new vertex out of the one that is selected, joined to it by an edge (E) or not (Shift D)."""

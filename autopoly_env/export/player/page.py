@@ -97,6 +97,7 @@ def _page_data(sequence: ConstructionSequence, target: Silhouette | None, title:
     parts = parts_of(sequence)
     cards = cards_of(sequence)
     steps = [_pose(sequence.start, sequence.start_score, describe_start(sequence.start), cards[0])]
+    steps[0]["part"] = parts.names[0]
     for number, (before, step, after) in enumerate(zip(meshes, sequence.steps, meshes[1:], strict=False), 1):
         motion = _motion(before, step, after)
         steps.append(_pose(after, step.score, describe_step(step, len(motion["moved"])), cards[number]) | motion)
@@ -127,6 +128,9 @@ def _pose(mesh: PolyMesh, score: PlainScore, words: Words, card: Card) -> dict[s
         "title": words.title,
         "done": words.done,
         "lines": [{"words": line.words, "state": line.state} for line in card.lines],
+        "picks": card.picks,
+        "aims": {name: _rounded(np.array((x, 1.0 - y))) for name, (x, y) in card.aims.items()},
+        "why": card.why,
         "menu": words.menu,
         "blender": words.blender,
     }
