@@ -147,6 +147,8 @@ def _record(done: "Retargeted") -> dict[str, Any]:
         "before": asdict(done.before),
         "refitted": asdict(done.refitted),
         "after": asdict(done.solution.score),
+        "start_iou": done.start_iou,
+        "begins_elsewhere": done.begins_elsewhere,
         "n_refits": done.solution.stats.n_refits,
     }
 
@@ -155,7 +157,13 @@ def _words(done: "Retargeted", n_steps: int) -> str:
     totals = (
         f"{done.before.total:.2f} as it was, {done.refitted.total:.2f} refitted, {done.solution.score.total:.2f} now"
     )
-    return f"steps: {done.n_kept} of {n_steps} kept, {done.n_dropped} dropped, {done.n_added} added\nr_all: {totals}"
+    steps = f"steps: {done.n_kept} of {n_steps} kept, {done.n_dropped} dropped, {done.n_added} added"
+    if done.begins_elsewhere:
+        steps += (
+            f"; kept in name only: the start is a detail here (IoU {done.start_iou:.3f}), no body as it was "
+            f"(at least {done.least_start_iou:.2f}); give a construction of a more similar shape, or solve it afresh"
+        )
+    return f"{steps}\nr_all: {totals}"
 
 
 if __name__ == "__main__":

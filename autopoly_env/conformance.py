@@ -279,8 +279,10 @@ def _check_telling(operator: Operator, mesh: PolyMesh, element: int, after: Poly
     _require(replayed.final() == after, f"{where}: the step does not replay to the same mesh")
     _, again, found = decoded(mesh, replayed.steps[0])
     _require((again, found) == (element, choice), f"{where}: its ids do not lead back to element and choice")
-    words = describe_step(replayed.steps[0], 0)
-    _require(all((words.title, words.done, *words.keys)), f"{where}: there are no words for it")
+    step = replayed.steps[0]
+    words = describe_step(step, 0)
+    deeds = operator.told.keys(step)
+    _require(all((words.title, words.done, deeds, *deeds)), f"{where}: there are no words for it")
     sources = operator.sources_of(mesh, element, choice, after)
     n_new = after.next_vertex_id - mesh.next_vertex_id
     _require(

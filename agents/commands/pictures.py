@@ -10,6 +10,7 @@ if TYPE_CHECKING:  # the rest is imported when it is used, so that --help is qui
     from autopoly_env.silhouette import ObjectOptions, Silhouette
 
 MASK = "mask.png"
+PANEL = "What in a picture is the object"  # a heading of the help
 
 Object = Annotated[
     str,
@@ -17,31 +18,48 @@ Object = Annotated[
         "--object",
         metavar="WHAT",
         help="The object: auto, dark, light, alpha (what is opaque), or a colour such as red or '#d04020'.",
+        rich_help_panel=PANEL,
     ),
 ]
 Background = Annotated[
     str | None,
-    typer.Option(metavar="COLOUR", help="The object is what differs from this.", show_default="the border's"),
+    typer.Option(
+        metavar="COLOUR",
+        help="The object is what differs from this.",
+        show_default="the border's",
+        rich_help_panel=PANEL,
+    ),
 ]
 Threshold = Annotated[
     float | None,
     typer.Option(
         help="Grey level between dark and light, 0 to 1; with a colour, the distance from it.",
         show_default="by the picture",
+        rich_help_panel=PANEL,
     ),
 ]
 AlphaThreshold = Annotated[
     float | None,
-    typer.Option(help="Alpha from which on a pixel is opaque, as a share of the largest.", show_default="0.5"),
+    typer.Option(
+        help="Alpha from which on a pixel is opaque, as a share of the largest.",
+        show_default="0.5",
+        rich_help_panel=PANEL,
+    ),
 ]
 MinSpeck = Annotated[
     int | None,
     typer.Option(
-        metavar="PIXELS", help="Parts and holes of fewer pixels are dirt.", show_default="by the picture's size"
+        metavar="PIXELS",
+        help="Parts and holes of fewer pixels are dirt.",
+        show_default="by the picture's size",
+        rich_help_panel=PANEL,
     ),
 ]
-KeepSpecks = Annotated[bool, typer.Option("--keep-specks", help="Nothing is dirt.")]
-ShowMask = Annotated[bool, typer.Option("--show-mask", help="Write the object that was found, black on white, too.")]
+KeepSpecks = Annotated[bool, typer.Option("--keep-specks", help="Nothing is dirt.", rich_help_panel=PANEL)]
+ShowMask = Annotated[
+    bool,
+    typer.Option("--show-mask", help="Write the object that was found, black on white, too.", rich_help_panel=PANEL),
+]
 
 
 def read_options(

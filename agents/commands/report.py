@@ -38,19 +38,36 @@ FORMATS = {  # of the numbers that a table can show, each and as a mean
     "refits": (".0f", ".1f"),
     "seconds": (".2f", ".2f"),
 }
-COLUMNS = ("r_sm", "r_sc", "r_si", "r_all", "actions", "valid", "blocking_in", "moved", "refits", "seconds")
+WORDS = {  # what is shown where nothing is asked for, and what it is called there
+    "r_all": "score",
+    "r_sm": "IoU",
+    "r_sc": "elements",
+    "r_si": "crossings",
+    "actions": "steps",
+    "valid": "sound",
+    "blocking_in": "big first",
+    "moved": "moved",
+    "refits": "refits",
+    "seconds": "seconds",
+}
+USUAL = {"r_si": 0.0, "valid": 1.0, "moved": 0.0}  # a column with nothing but this says nothing
 WARNING = "warning:"
 MOST_NOTES = 8  # lines of notes below a table
 LOST = " the mesh "  # in notes on what a mesh has lost
 MOST_NAMES = 4  # names of images in such a line
 PLAIN_WIDTH = 120  # of a table that goes to a file
+MOST_NAME = 24  # letters of a name in a line of it; longer ones are folded
+SPACE = 3  # letters between columns
 
 
 class Report:
-    """Tells the user how it goes with `n_tasks` images; as a context it shows the progress bar where it can be seen."""
+    """Tells the user how it goes with `n_tasks` images; as a context it shows the progress bar where it can be seen.
+
+    The table has `columns` of FORMATS, by these names; where there are none, those of WORDS that say something.
+    """
 
     def __init__(
-        self, n_tasks: int, *, as_json: bool = False, quiet: bool = False, columns: tuple[str, ...] = COLUMNS
+        self, n_tasks: int, *, as_json: bool = False, quiet: bool = False, columns: tuple[str, ...] = ()
     ) -> None:
         self.n_failed = 0
         self._columns = columns
@@ -123,7 +140,8 @@ class Report:
         if not (self._quiet and self._as_json):
             lines.append(f"Open {overview or self._picture}")
         if not self._as_json:
-            self._output.print(_table(self._rows, self._columns))
+            for table in _tables(self._rows, self._columns, self._output.width):
+                self._output.print(table)
         for line in lines:
             say(self._messages if self._as_json else self._output, line)
 
@@ -152,15 +170,42 @@ def _numbers_of(result: Result) -> dict[str, float]:
     }
 
 
-def _table(rows: dict[str, dict[str, float]], columns: tuple[str, ...]) -> Table:
-    """A row for every image, by its numbers, and their mean if there are several."""
-    table = Table(box=box.SIMPLE_HEAD, show_footer=len(rows) > 1)
-    table.add_column("name", footer=f"mean of {len(rows)}", overflow="fold")
+def _tables(rows: dict[str, dict[str, float]], columns: tuple[str, ...], width: int) -> list[Table]:
+    """A row for every image, by its numbers, and their mean if there are several; more tables where one is too wide."""
+    if not columns:
+        columns = tuple(name for name in WORDS if any(n[name] != USUAL.get(name) for n in rows.values()))
+        heads = {name: WORDS[name] for name in columns}
+    else:
+        heads = {name: name for name in columns}
+    texts = {name: _column(rows, name) for name in columns}
+    room = width - min(MOST_NAME, max(len("mean of 100"), *(len(tame(image)) for image in rows))) - 2 * SPACE
+    tables: list[list[str]] = [[]]
     for name in columns:
-        mean = sum(numbers[name] for numbers in rows.values()) / len(rows)
-        table.add_column(name, footer=format(mean, FORMATS[name][1]), justify="right", no_wrap=True)
-    for image, numbers in rows.items():
-        table.add_row(Text(tame(image)), *(format(numbers[name], FORMATS[name][0]) for name in columns))
+        needed = sum(_width(texts[other], heads[other]) for other in (*tables[-1], name))
+        if tables[-1] and needed > room:
+            tables.append([])
+        tables[-1].append(name)
+    return [_table(list(rows), {heads[name]: texts[name] for name in names}) for names in tables]
+
+
+def _column(rows: dict[str, dict[str, float]], name: str) -> list[str]:
+    """The numbers of a column, and their mean."""
+    mean = sum(numbers[name] for numbers in rows.values()) / len(rows)
+    return [*(format(numbers[name], FORMATS[name][0]) for numbers in rows.values()), format(mean, FORMATS[name][1])]
+
+
+def _width(texts: list[str], head: str) -> int:
+    return max(map(len, (head, *texts))) + SPACE
+
+
+def _table(names: list[str], columns: dict[str, list[str]]) -> Table:
+    """A table of texts by their heads, the mean last."""
+    table = Table(box=box.SIMPLE_HEAD, show_footer=len(names) > 1)
+    table.add_column("name", footer=f"mean of {len(names)}", overflow="fold")
+    for head, texts in columns.items():
+        table.add_column(head, footer=texts[-1], justify="right", no_wrap=True)
+    for number, name in enumerate(names):
+        table.add_row(Text(tame(name)), *(texts[number] for texts in columns.values()))
     return table
 
 

@@ -31,6 +31,8 @@ from autopoly_env.simulator import Simulator
 _N_TRIED = 10  # neighbours that are refitted, those that are best as they are
 _N_THOROUGH = 3  # constructions that are refitted again, harder, before the climb ends
 _LEAST_GAIN = 1e-9
+START_SHARE = 0.5  # of the IoU that the start has on its own target: with less it is on another part of the shape
+_WORTH = 10.0  # points of r_all that a start on the same part may cost
 _N_BEGINNINGS = 3  # ways to lay the construction over the target that are climbed from, while the budget lasts
 
 
@@ -45,6 +47,13 @@ class Retargeted:
     before: Score  # of the given last mesh, as it is, on the new target
     refitted: Score  # of the same steps, none lost or added, laid over the new target and refitted
     aligned: PolyMesh  # which that is the score of
+    start_iou: float  # of the start mesh on the new target
+    least_start_iou: float  # below which it begins elsewhere than the given one did
+
+    @property
+    def begins_elsewhere(self) -> bool:
+        """Whether the start, which was a body once, is a detail of the new shape."""
+        return self.start_iou < self.least_start_iou
 
 
 def retarget(
@@ -59,24 +68,36 @@ def retarget(
     """
     meter = Meter(budget, on_progress)
     beginnings = align(simulator, sequence, meter)
+    aligned, least = beginnings[0], START_SHARE * sequence.start_score["iou"]
+
+    def worth(one: Version) -> float:
+        return one.total - _WORTH * (_start_iou(simulator, one) < least)
+
+    beginnings.sort(key=worth, reverse=True)
     version = beginnings[0]
     try:
         for beginning in beginnings:
             for better in improve(simulator, beginning, meter):
-                version = max(version, better, key=total_of)
+                version = max(version, better, key=worth)
     except KeyboardInterrupt:
         meter.stopped_by = "interrupted"
     solution = finish(simulator, version.states(simulator), meter, keep_steps=True)
     n_steps = len(solution.sequence.steps)
     n_kept = sum(origin is not None for origin in version.origins[:n_steps])
-    aligned = beginnings[0].mesh
-    before, refitted = simulator.final_score(sequence.final()), simulator.final_score(aligned)
+    before, refitted = simulator.final_score(sequence.final()), simulator.final_score(aligned.mesh)
     n_dropped = len(sequence.steps) - n_kept
-    return Retargeted(solution, n_kept, n_dropped, n_steps - n_kept, before, refitted, aligned)
+    start_iou = solution.sequence.start_score["iou"]
+    return Retargeted(solution, n_kept, n_dropped, n_steps - n_kept, before, refitted, aligned.mesh, start_iou, least)
+
+
+def _start_iou(simulator: Simulator, version: Version) -> float:
+    return simulator.score(version.start).iou
 
 
 def align(simulator: Simulator, sequence: ConstructionSequence, meter: Meter) -> list[Version]:
     """The construction laid over the target in a few ways, the best first; no step is lost or added.
+
+    Where those start on another part of the shape (`START_SHARE`), the best that does not is among them, too.
 
     Raises SequenceError where no way leaves it without crossings and flipped faces.
     """
@@ -95,7 +116,9 @@ def align(simulator: Simulator, sequence: ConstructionSequence, meter: Meter) ->
         raise SequenceError(
             "its steps cannot be laid over the target without crossings or forbidden faces; give another sequence"
         )
-    return settled[:_N_BEGINNINGS]
+    least = START_SHARE * sequence.start_score["iou"]
+    same = [one for one in settled if _start_iou(simulator, one) >= least]
+    return list(dict.fromkeys([*settled[:_N_BEGINNINGS], *same[:1]]))
 
 
 def improve(simulator: Simulator, version: Version, meter: Meter) -> Iterator[Version]:

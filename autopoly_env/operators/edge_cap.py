@@ -9,13 +9,14 @@ from autopoly_env.arrays import FloatArray
 from autopoly_env.mesh import PolyMesh, mirrored
 from autopoly_env.mesh.planar_kernels import clear_extrusion
 from autopoly_env.operators.action import Choice, Start
+from autopoly_env.operators.deeds import NOTHING, Deed, Press, Pull, select
 from autopoly_env.operators.edge_extrude import INSET, MAX_HALVINGS, boundary_edges
 from autopoly_env.operators.elements import EDGE
 from autopoly_env.operators.evidence import Evidence, missing_mass, sane_move
 from autopoly_env.operators.mirroring import again, moved
 from autopoly_env.operators.operator import Mirroring, Operator
 from autopoly_env.operators.rebuilding import ends_along_face, grown, refusal
-from autopoly_env.operators.wording import EDGES, Gesture, Phrases, begun_with, element_words
+from autopoly_env.operators.wording import Gesture, Phrases, Told, begun_with
 
 HEIGHT = 0.5  # of the edge's length
 
@@ -65,6 +66,16 @@ def _blender(mesh: PolyMesh, edge: int, _choice: Choice | None) -> list[Any]:
     return [mesh.vertex_ids[v] for v in ends_along_face(mesh, edge)]
 
 
+def _deeds(step: Told) -> tuple[Deed, ...]:
+    ends: tuple[int, ...] = tuple(step.element["edge"])
+    (tip,) = step.created["vertices"]
+    return (
+        select("edge", ends),
+        Pull(ends, (-1, -2), middle=tip),
+        Press(("M",), "At Center", leaves=NOTHING, effect="makes one point of it"),
+    )
+
+
 edge_cap = Operator(
     "edge_cap",
     EDGE,
@@ -82,14 +93,11 @@ edge_cap = Operator(
             f"{begun_with(step)} gets a triangle, face {step.created['faces'][0]}, "
             f"with its tip at vertex {step.created['vertices'][0]}."
         ),
-        lambda step: (
-            f"{EDGES} edge select, click {element_words(step)}",
-            "`E`: pull the new edge out to where the tip belongs, click",
-            "`M` › At Center makes a tip of it",
-        ),
+        _deeds,
         "Edge › Extrude Edges, then Mesh › Merge › At Center",
         "mesh.merge",
         lambda _: Gesture("KPBBKPBB", drags=True),
+        "The shape runs out to a point here.",
     ),
     blender=_blender,
 )

@@ -7,10 +7,11 @@ import numpy as np
 from autopoly_env.arrays import BoolArray
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators.action import Choice
+from autopoly_env.operators.deeds import Press, select
 from autopoly_env.operators.elements import EDGE
 from autopoly_env.operators.operator import Operator
 from autopoly_env.operators.rebuilding import corner_of, refusal, shrunk, without
-from autopoly_env.operators.wording import EDGES, Gesture, Phrases, begun_with, element_words
+from autopoly_env.operators.wording import Gesture, Phrases, begun_with
 
 
 def dissolvable_edges(mesh: PolyMesh) -> BoolArray:
@@ -64,12 +65,18 @@ edge_dissolve = Operator(
         "Dissolve an edge",
         lambda step: f"{begun_with(step)} is dissolved: the faces beside it become one.",
         lambda step: (
-            f"{EDGES} edge select, click {element_words(step)}",
-            "`X` › Dissolve Edges; in the panel (`F9`) untick Dissolve Vertices",
+            select("edge", tuple(step.element["edge"])),
+            Press(
+                ("X",),
+                "Dissolve Edges",
+                unticked=("Dissolve Vertices",),
+                leaves=select("vertex", *((v,) for v in step.element["edge"])),
+            ),
         ),
         "Mesh › Delete › Dissolve Edges",
         "mesh.dissolve_edges",
         lambda _: Gesture("KK"),
+        "The edge is inside the shape and not needed.",
     ),
     blender=_blender,
 )

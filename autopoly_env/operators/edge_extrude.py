@@ -9,12 +9,13 @@ from autopoly_env.arrays import BoolArray, FloatArray
 from autopoly_env.mesh import PolyMesh, mirrored
 from autopoly_env.mesh.planar_kernels import clear_extrusion
 from autopoly_env.operators.action import Choice, Start
+from autopoly_env.operators.deeds import Pull, select
 from autopoly_env.operators.elements import EDGE
 from autopoly_env.operators.evidence import Evidence, missing_mass, sane_move
 from autopoly_env.operators.mirroring import again, moved
 from autopoly_env.operators.operator import Mirroring, Operator
 from autopoly_env.operators.rebuilding import ends_along_face, grown, refusal
-from autopoly_env.operators.wording import EDGES, Gesture, Phrases, begun_with, element_words
+from autopoly_env.operators.wording import Gesture, Phrases, begun_with
 
 OFFSET = 0.25  # of the edge's length
 INSET = 0.25
@@ -99,7 +100,10 @@ edge_extrude = Operator(
     phrases=Phrases(
         "Extrude an edge",
         lambda step: f"{begun_with(step)} is pulled out to a new quad, face {step.created['faces'][0]}.",
-        lambda step: (f"{EDGES} edge select, click {element_words(step)}", "`E`: pull the new edge out, click"),
+        lambda step: (
+            select("edge", tuple(step.element["edge"])),
+            Pull(tuple(step.element["edge"]), tuple(step.created["vertices"])),
+        ),
         "Edge › Extrude Edges",
         "mesh.extrude_edges_move",
         lambda _: Gesture("KPBB", drags=True),

@@ -10,13 +10,14 @@ from autopoly_env.errors import IllegalActionError
 from autopoly_env.mesh import Face, PolyMesh
 from autopoly_env.operators.action import Choice, Start
 from autopoly_env.operators.choices import TO_EDGE
+from autopoly_env.operators.deeds import Press, select
 from autopoly_env.operators.elements import EDGE
 from autopoly_env.operators.evidence import Evidence
 from autopoly_env.operators.fill_kernels import fill_costs, fillable
 from autopoly_env.operators.mirroring import again
 from autopoly_env.operators.operator import Mirroring, Operator
 from autopoly_env.operators.rebuilding import ends_along_face, grown, refusal, rim_defect
-from autopoly_env.operators.wording import EDGES, Gesture, Phrases, Told, begun_with, element_words
+from autopoly_env.operators.wording import Gesture, Phrases, Told, begun_with
 
 N_STARTS = 3  # faces to begin with: those over most of what is missing
 
@@ -172,10 +173,14 @@ edge_fill = Operator(
     phrases=Phrases(
         "Fill between two edges",
         _done,
-        lambda step: (f"{EDGES} edge select, click {element_words(step)}, `Shift` click {_other_edge(step)}", "`F`"),
+        lambda step: (
+            select("edge", tuple(step.element["edge"]), tuple(step.choice["to"] if step.choice else ())),
+            Press(("F",), leaves=select("face", tuple(step.created["faces"])), effect="fills a face between them"),
+        ),
         "Vertex › New Edge/Face from Vertices",
         "mesh.edge_face_add",
         lambda _: Gesture("K", n_selected=2),
+        "Between the two edges is shape, too.",
     ),
     blender=_blender,
 )

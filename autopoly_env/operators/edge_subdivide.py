@@ -8,12 +8,13 @@ import numpy as np
 from autopoly_env.arrays import BoolArray, FloatArray
 from autopoly_env.mesh import PolyMesh, mirrored
 from autopoly_env.operators.action import Choice, Start
+from autopoly_env.operators.deeds import Deed, Press, select
 from autopoly_env.operators.elements import EDGE
 from autopoly_env.operators.evidence import Evidence, sane_move
 from autopoly_env.operators.mirroring import again, moved
 from autopoly_env.operators.operator import Mirroring, Operator
 from autopoly_env.operators.rebuilding import corner_of, grown
-from autopoly_env.operators.wording import EDGES, Gesture, Phrases, begun_with, element_words
+from autopoly_env.operators.wording import Gesture, Phrases, Told, begun_with
 
 
 def any_edge(mesh: PolyMesh) -> BoolArray:
@@ -76,6 +77,13 @@ def _blender(mesh: PolyMesh, edge: int, _choice: Choice | None) -> list[Any]:
     return [mesh.vertex_ids[v] for v in mesh.edges[edge]]
 
 
+def _deeds(step: Told) -> tuple[Deed, ...]:
+    a, b = step.element["edge"]
+    (new,) = step.created["vertices"]
+    halves = select("edge", (a, new), (new, b))
+    return select("edge", (a, b)), Press(("Right-click",), "Subdivide", leaves=halves, effect="both halves")
+
+
 edge_subdivide = Operator(
     "edge_subdivide",
     EDGE,
@@ -91,10 +99,7 @@ edge_subdivide = Operator(
     phrases=Phrases(
         "Subdivide an edge",
         lambda step: f"{begun_with(step)} gets vertex {step.created['vertices'][0]} in its middle.",
-        lambda step: (
-            f"{EDGES} edge select, click {element_words(step)}",
-            "Right-click › Subdivide; Number of Cuts stays 1",
-        ),
+        _deeds,
         "Edge › Subdivide",
         "mesh.subdivide",
         lambda _: Gesture("BBPBB"),

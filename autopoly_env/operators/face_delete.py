@@ -8,11 +8,12 @@ import numpy as np
 from autopoly_env.arrays import BoolArray
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators.action import Choice, Start
+from autopoly_env.operators.deeds import NOTHING, Press, select
 from autopoly_env.operators.elements import FACE
 from autopoly_env.operators.mirroring import again
 from autopoly_env.operators.operator import Mirroring, Operator
 from autopoly_env.operators.rebuilding import refusal, shrunk, without
-from autopoly_env.operators.wording import FACES, Gesture, Phrases, Told, begun_with, count, element_words
+from autopoly_env.operators.wording import Gesture, Phrases, Told, begun_with, count
 
 
 def any_face_but_the_last(mesh: PolyMesh) -> BoolArray:
@@ -61,10 +62,11 @@ face_delete = Operator(
     phrases=Phrases(
         "Delete a face",
         _done,
-        lambda step: (f"{FACES} face select, click {element_words(step)}", "`X` › Faces"),
+        lambda step: (select("face", (step.element["face"],)), Press(("X",), "Faces", leaves=NOTHING)),
         "Mesh › Delete › Faces",
         "mesh.delete",
         lambda _: Gesture("KPBB"),
+        "There is no shape here.",
     ),
     blender=_blender,
 )

@@ -10,6 +10,7 @@ from autopoly_env.errors import IllegalActionError
 from autopoly_env.mesh import PolyMesh, mirrored
 from autopoly_env.operators.action import Choice, Start
 from autopoly_env.operators.choices import OF_HOLE
+from autopoly_env.operators.deeds import NO_FACE, NOTHING, Cut, Deed, Press, select
 from autopoly_env.operators.elements import HOLE, HOLE_SIDES, hole_face
 from autopoly_env.operators.evidence import Evidence, Region
 from autopoly_env.operators.hole_kernels import roomy_faces
@@ -17,7 +18,7 @@ from autopoly_env.operators.holes import HoleChoice, default_hole, hole_defect, 
 from autopoly_env.operators.mirroring import again
 from autopoly_env.operators.operator import Mirroring, Operator
 from autopoly_env.operators.rebuilding import corners_from_last, grown, refusal
-from autopoly_env.operators.wording import FACES, Gesture, Phrases, Told
+from autopoly_env.operators.wording import Gesture, Phrases, Told
 
 TINY_AREA = 1e-6  # unit square; 1/16 of a pixel at 256 x 256
 _RIM_PROMISE = 0.1  # of an excess that an edge answers for, left to a hole
@@ -188,12 +189,18 @@ def _done(step: Told) -> str:
     )
 
 
-def _keys(step: Told) -> tuple[str, ...]:
-    a, b = _bridge_ends(step)
+def _deeds(step: Told) -> tuple[Deed, ...]:
+    """The knife: from a over the hole to b, then round its other side; then the face in the hole."""
+    hole: list[int] = step.created["vertices"]
+    (a, i), (b, j) = step.choice["bridges"] if step.choice else ((0, 0), (0, 0))
+    there, n = (j - i) % len(hole), len(hole)
+    one, other = [(i + k) % n for k in range(there + 1)], [(i - k) % n for k in range(n - there + 1)]
+    near, far = (one, other) if len(one) <= len(other) else (other, one)
     return (
-        f"{FACES} face select, click face {step.element['face']}",
-        f"`K` knife: from {a} to the hole, once around it, and on to {b}; `Enter`",
-        "Click the face inside the hole, `X` › Faces",
+        NO_FACE,
+        Cut(((a, *(hole[k] for k in near), b), tuple(hole[k] for k in far))),
+        select("face", tuple(hole)),
+        Press(("X",), "Faces", leaves=NOTHING),
     )
 
 
@@ -224,6 +231,8 @@ face_hole = Operator(
     promise=_promise,
     mirror=_mirror,
     sources=_sources,
-    phrases=Phrases("Cut a hole", _done, _keys, "Mesh › Knife Tool", "mesh.knife_tool", _gesture),
+    phrases=Phrases(
+        "Cut a hole", _done, _deeds, "Mesh › Knife Tool", "mesh.knife_tool", _gesture, "The picture has a hole here."
+    ),
     blender=_blender,
 )

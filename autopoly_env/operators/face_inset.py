@@ -8,12 +8,13 @@ import numpy as np
 from autopoly_env.arrays import BoolArray, FloatArray
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators.action import Choice, Start
+from autopoly_env.operators.deeds import Press, select
 from autopoly_env.operators.elements import FACE
 from autopoly_env.operators.evidence import Evidence, sane_move
 from autopoly_env.operators.face_hole import TINY_AREA
 from autopoly_env.operators.operator import Operator
 from autopoly_env.operators.rebuilding import grown, refusal
-from autopoly_env.operators.wording import FACES, Gesture, Phrases, begun_with, element_words
+from autopoly_env.operators.wording import Gesture, Phrases, begun_with
 
 SCALE = 0.5  # of the face, to which its middle shrinks
 _SCALES = (0.1, 0.9)  # of a middle that is as large as what is too much there
@@ -101,10 +102,21 @@ face_inset = Operator(
     phrases=Phrases(
         "Inset a face",
         lambda step: f"{begun_with(step)} gets a ring of {len(step.created['faces'])} quads around its middle.",
-        lambda step: (f"{FACES} face select, click {element_words(step)}", "`I`: pull its middle in, click"),
+        lambda step: (
+            select("face", (step.element["face"],)),
+            Press(
+                ("I",),
+                typed="0",
+                leaves=select("face", (step.element["face"],)),
+                effect="makes a copy of the face, as large as it is",
+                on_sources=True,
+            ),
+            Press(("S",), typed=f"{SCALE:g}", effect="makes the copy smaller, about its middle"),
+        ),
         "Face › Inset Faces",
         "mesh.inset",
         lambda _: Gesture("KPBB"),
+        "A ring of quads makes room for a smaller face inside.",
     ),
     blender=_blender,
 )

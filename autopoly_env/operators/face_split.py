@@ -9,10 +9,11 @@ from autopoly_env.mesh import Face, PolyMesh
 from autopoly_env.mesh.planar_kernels import is_free_diagonal, split_imbalance, splittable_corners
 from autopoly_env.operators.action import Choice
 from autopoly_env.operators.choices import TO_CORNER
+from autopoly_env.operators.deeds import Press, select
 from autopoly_env.operators.elements import CORNER
 from autopoly_env.operators.operator import Operator
 from autopoly_env.operators.rebuilding import corner_of, corners_from_last, grown, refusal
-from autopoly_env.operators.wording import VERTICES, Gesture, Phrases, Told
+from autopoly_env.operators.wording import Gesture, Phrases, Told
 
 
 def corners_with_diagonal(mesh: PolyMesh) -> BoolArray:
@@ -99,12 +100,13 @@ face_split = Operator(
             f"and vertex {_other_end(step)}; the other part is face {step.created['faces'][0]}."
         ),
         lambda step: (
-            f"{VERTICES} vertex select, click vertex {step.element['vertex']}, `Shift` click vertex {_other_end(step)}",
-            "`J` joins them",
+            select("vertex", (step.element["vertex"],), (_other_end(step),)),
+            Press(("J",), effect="joins them with an edge"),
         ),
         "Vertex › Connect Vertex Path",
         "mesh.vert_connect_path",
         lambda _: Gesture("K", n_selected=2),
+        "Each half of the face can change on its own now.",
     ),
     blender=_blender,
 )

@@ -10,6 +10,7 @@ from autopoly_env.errors import IllegalActionError
 from autopoly_env.mesh import Face, PolyMesh, mirrored
 from autopoly_env.operators.action import Choice, Start
 from autopoly_env.operators.choices import SLIDE
+from autopoly_env.operators.deeds import NO_EDGE, Loop
 from autopoly_env.operators.elements import EDGE
 from autopoly_env.operators.evidence import Blame, Evidence, sane_move
 from autopoly_env.operators.mirroring import again, moved
@@ -207,13 +208,11 @@ loop_cut = Operator(
     phrases=Phrases(
         "Cut an edge loop",
         _done,
-        lambda step: (
-            f"`Ctrl` `R`, point at {element_words(step)}, click",
-            "Slide the loop to where it is drawn, click",
-        ),
+        lambda step: (NO_EDGE, Loop(tuple(step.element["edge"]))),
         "Edge › Loop Cut and Slide",
         "mesh.loopcut_slide",
         lambda _: Gesture("KKPBBPBB"),
+        "New corners let the shape bend between the ends of the strip.",
     ),
     blender=_blender,
 )

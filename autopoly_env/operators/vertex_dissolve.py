@@ -8,11 +8,12 @@ import numpy as np
 from autopoly_env.arrays import BoolArray
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators.action import Choice, Start
+from autopoly_env.operators.deeds import NOTHING, Press, select
 from autopoly_env.operators.elements import VERTEX
 from autopoly_env.operators.mirroring import again
 from autopoly_env.operators.operator import Mirroring, Operator
 from autopoly_env.operators.rebuilding import corner_of, refusal, shrunk, without
-from autopoly_env.operators.wording import VERTICES, Gesture, Phrases, begun_with, element_words
+from autopoly_env.operators.wording import Gesture, Phrases, begun_with
 
 
 def dissolvable_vertices(mesh: PolyMesh) -> BoolArray:
@@ -70,12 +71,13 @@ vertex_dissolve = Operator(
         "Dissolve a vertex",
         lambda step: f"{begun_with(step)} is dissolved: its two edges become one.",
         lambda step: (
-            f"{VERTICES} vertex select, click {element_words(step)}",
-            "`Ctrl` `X`, or `X` › Dissolve Vertices",
+            select("vertex", (step.element["vertex"],)),
+            Press(("X",), "Dissolve Vertices", leaves=NOTHING),
         ),
         "Mesh › Delete › Dissolve Vertices",
         "mesh.dissolve_verts",
         lambda _: Gesture("KK"),
+        "The outline is straight enough without this vertex.",
     ),
     blender=_blender,
 )

@@ -12,12 +12,13 @@ from autopoly_env.mesh import PolyMesh
 from autopoly_env.mesh.planar_kernels import cross
 from autopoly_env.operators.action import Choice, Start
 from autopoly_env.operators.choices import TO_VERTEX
+from autopoly_env.operators.deeds import Press, select
 from autopoly_env.operators.elements import VERTEX
 from autopoly_env.operators.evidence import Evidence
 from autopoly_env.operators.mirroring import again, moved
 from autopoly_env.operators.operator import Mirroring, Operator
 from autopoly_env.operators.rebuilding import refusal, rim_defect, shrunk
-from autopoly_env.operators.wording import VERTICES, Gesture, Phrases, Told, element_words
+from autopoly_env.operators.wording import Gesture, Phrases, Told, element_words
 
 N_STARTS = 2  # vertices to merge with: those across most of what is missing
 
@@ -184,12 +185,13 @@ vertex_merge = Operator(
         "Merge two vertices",
         lambda step: f"{element_words(step).capitalize()} is merged into vertex {_other_end(step)}.",
         lambda step: (
-            f"{VERTICES} vertex select, click {element_words(step)}, `Shift` click vertex {_other_end(step)}",
-            "`M` › At Last",
+            select("vertex", (step.element["vertex"],), (_other_end(step),)),
+            Press(("M",), "At Last", leaves=select("vertex", (_other_end(step),)), effect="makes one of them"),
         ),
         "Mesh › Merge › At Last",
         "mesh.merge",
         lambda _: Gesture("KPBB", n_selected=2),
+        "The gap between the two corners closes.",
     ),
     blender=_blender,
 )

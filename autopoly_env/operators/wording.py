@@ -5,11 +5,12 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from autopoly_env.errors import ConfigError
+from autopoly_env.operators.deeds import Deed
 from autopoly_env.shown import told
 
 _MOST_WORDS = 80  # letters that name an element
 
-EDGES, FACES, VERTICES = "`2`", "`3`", "`1`"  # Blender's select modes
+EDGES, FACES, VERTICES = "`2`", "`3`", "`1`"  # Blender's select modes, for what is told in plain words
 
 
 class Told(Protocol):
@@ -51,14 +52,18 @@ def from_a_menu(_step: Told) -> Gesture:
 
 @dataclass(frozen=True)
 class Phrases:
-    """What there is to say about the steps of one operator; keys to press stand between backticks."""
+    """What there is to say about the steps of one operator; keys to press stand between backticks.
+
+    What to do by hand is best told in records, which Blender can be driven by; plain words do where there are none.
+    """
 
     title: str  # "Extrude an edge"
     done: Callable[[Told], str]  # what happened, a sentence with ids
-    keys: Callable[[Told], tuple[str, ...]]  # what to do in Blender's edit mode, one after the other
+    keys: Callable[[Told], tuple[Deed | str, ...]]  # what to do in Blender's edit mode, one after the other
     menu: str  # where Blender has the same in its menus
     blender: str  # the name of Blender's operator
     gesture: Callable[[Told], Gesture] = from_a_menu  # what `keys` cost the hand (docs/lessons.md)
+    why: str = ""  # what it is good for, a sentence
 
 
 def element_words(step: Told) -> str:

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import pytest
 from PIL import Image
 
 from agents.budget import Budget, Meter, Progress
-from agents.retarget import main
+from agents.retarget import _words, main
 from agents.retell.retargeting import align, retarget
 from autopoly_env.mesh import PolyMesh, is_sane
 from autopoly_env.operators import OPERATORS, Action
@@ -66,6 +67,14 @@ def test_the_same_shape__is_met_exactly_with_all_steps_kept(target: Silhouette) 
     assert done.solution.score.iou > 0.99
     assert [step.operator for step in done.solution.sequence.steps] == ["edge_subdivide"] * 2
     assert done.before.total < done.solution.score.total
+
+
+def test_start_on_a_detail__is_called_what_it_is() -> None:
+    done = retarget(Simulator(TALL), ell(), Budget(refits=60))
+    assert not done.begins_elsewhere and done.start_iou == done.solution.sequence.start_score["iou"]
+    elsewhere = replace(done, start_iou=0.049, least_start_iou=0.36)
+    assert "kept in name only: the start is a detail here (IoU 0.049)" in _words(elsewhere, 2)
+    assert "in name only" not in _words(done, 2)
 
 
 def test_steps_that_are_not_needed__are_dropped() -> None:

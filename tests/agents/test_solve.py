@@ -1,5 +1,6 @@
 """The command `python -m agents.solve`: what it writes, prints and returns, and what Ctrl-C leaves behind."""
 
+import io
 import json
 import os
 import shutil
@@ -15,9 +16,12 @@ import numpy as np
 import pytest
 import shapely
 from PIL import Image
+from rich.console import Console
 
 from agents.base import Decision
 from agents.baselines.beam import BeamAgent, BeamConfig
+from agents.commands.columns import LESSON
+from agents.commands.report import FORMATS, WORDS, _tables
 from agents.commands.results import RESULTS
 from agents.entry import entry_of
 from agents.registry import AGENTS
@@ -32,7 +36,7 @@ from tests.helpers.paths import EXAMPLES, ROOT
 from tests.helpers.shapes import shapely_coverage
 
 QUICK = ("--resolution", "64")
-COLUMNS = ["name", "r_sm", "r_sc", "r_si", "r_all", "actions", "valid", "blocking_in", "moved", "refits", "seconds"]
+COLUMNS = ["name", "score", "IoU", "elements", "steps", "big", "first", "refits", "seconds"]  # without what is as usual
 RECORD_KEYS = [
     *("image", "name", "agent", "settings", "seed", "r_sm", "r_sc", "r_si", "r_all", "V", "E", "F"),
     *("actions", "valid", "blocking_in", "moved", "quads", "ngons", "concave", "effort", "returns"),
@@ -116,8 +120,8 @@ def test_solve__shows_a_table_with_means_and_names_the_overview_last(run: Run) -
     assert (done.code, done.err) == (0, "")
     assert COLUMNS in [line.split() for line in lines]
     rows = {line.split()[0]: line.split()[1:] for line in lines if line.strip()}
-    totals = [float(rows[name][3]) for name in ("bottle", "mug")]
-    assert float(rows["mean"][5]) == pytest.approx(np.mean(totals), abs=0.011)  # after "of 2" and three columns
+    totals = [float(rows[name][0]) for name in ("bottle", "mug")]
+    assert float(rows["mean"][2]) == pytest.approx(np.mean(totals), abs=0.011)  # after "of 2"
     assert "note: object has 1 hole: mug" in lines
     assert lines[-1] == "Open deep/results/overview.png"
     assert Image.open("deep/results/overview.png").width == 2 * (256 + 64)
@@ -172,10 +176,51 @@ def test_columns__are_those_that_are_asked_for(run: Run) -> None:
     assert rows["mean"][4:] == ["0.0", "1.00", rows["mean"][6], "0.000", "1.00", "0.0", "0.0", "0.0", "0.00", "1.0"]
 
 
+NUMBERS = {name: 1234.5 for name in FORMATS}
+
+
+@pytest.mark.parametrize("columns", [(), tuple(FORMATS), LESSON])
+@pytest.mark.parametrize("name", ["mug", "a-name-that-goes-on-and-on-until-it-fills-a-line-of-its-own"])
+def test_tables__cut_nothing_at_80_columns(columns: tuple[str, ...], name: str) -> None:
+    console = Console(width=80, file=io.StringIO())
+    for table in _tables({name: NUMBERS, "b": NUMBERS}, columns, 80):
+        console.print(table)
+    printed = console.file.getvalue()  # type: ignore[attr-defined]
+    assert "…" not in printed and max(map(len, printed.splitlines())) <= 80
+    shown = columns or WORDS.values()
+    heads = [line for line in printed.splitlines() if line.strip().startswith("name")]
+    assert " ".join(" ".join(heads).split()).replace("name ", "") == " ".join(shown)
+    texts = [format(1234.5, FORMATS[column][0]) for column in columns or WORDS]
+    rows = [line.split()[1:] for line in printed.splitlines() if line.strip().startswith("b ")]
+    assert [text for row in rows for text in row] == texts
+
+
+def test_table__leaves_out_what_is_as_usual() -> None:
+    usual = {**NUMBERS, "r_si": 0.0, "valid": 1.0, "moved": 0.0}
+    (table,) = _tables({"a": usual, "b": usual}, (), 100)
+    assert [str(column.header) for column in table.columns][1:] == [
+        word for name, word in WORDS.items() if name not in ("r_si", "valid", "moved")
+    ]
+    tables = _tables({"a": usual, "b": {**usual, "moved": 0.1}}, (), 120)
+    assert "moved" in [str(column.header) for table in tables for column in table.columns]
+
+
+@pytest.mark.parametrize("flag", ["--help", "-h"])
+def test_help__fits_a_screen_and_names_six_options_and_the_rest_is_under_headings(run: Run, flag: str) -> None:
+    lines = run(flag).out.splitlines()
+    assert len(lines) <= 40 and max(map(len, lines)) <= 80
+    options = [line.split()[0] for line in lines if line.startswith("  --")]
+    assert options == ["--style", "--w-sc", "--agent", "--seconds", "--object", "--out"]
+    whole = run("--help-all").out
+    assert all(option in whole for option in (*options, "--refits", "--symmetry", "--threshold", "--columns"))
+    for heading in ("What is built", "Weights and limits", "Guidance", "What in a picture is the object", "Output"):
+        assert heading in whole
+
+
 @pytest.mark.parametrize(
     ("columns", "reason"),
     [
-        ("r_all,beauty", "--columns r_all,beauty: 'beauty' is none; give some of lesson, r_sm, r_sc"),
+        ("r_all,beauty", "--columns r_all,beauty: 'beauty' is none; give some of all, lesson, r_sm, r_sc"),
         ("moved,lesson", "--columns moved,lesson: moved stands there twice; name it once"),
     ],
 )
@@ -567,7 +612,7 @@ def test_style__that_is_none_and_operators_that_are_missing_are_told_before_the_
 
 def test_help__names_every_agent_and_loads_nothing_heavy() -> None:
     heavy = {"numba", "skimage", "shapely", "torch", "pydantic"}
-    code = f"import sys, agents.solve; agents.solve.main(['--help']); assert not {heavy} & set(sys.modules)"
+    code = f"import sys, agents.solve; agents.solve.main(['--help-all']); assert not {heavy} & set(sys.modules)"
     env = os.environ | {"PYTHONPATH": str(ROOT)}
     shown = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True).stdout
     assert set(AGENTS) <= set(shown.replace(",", " ").replace(".", " ").split())

@@ -11,7 +11,8 @@ register_format(
         "blender",
         (".py",),
         "a Python script that builds the mesh with Blender's own operators",
-        lambda export, path: save_blender_script(export.sequence, path, export.depth),
+        lambda export, path: save_blender_script(export.sequence, path, export.depth, target=export.target),
+        shows_target=True,
         shows_depth=True,
     )
 )

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from autopoly_env.errors import SequenceError
+from autopoly_env.export.pictures import picture_url
 from autopoly_env.export.replay import finite_meshes, sequence_name, unmoved
 from autopoly_env.export.solid import check_depth
 from autopoly_env.files import write_atomically
@@ -13,28 +14,37 @@ from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import operator_named
 from autopoly_env.sequence import ConstructionSequence, Step
 from autopoly_env.sequence.ids import decoded
+from autopoly_env.silhouette import Silhouette
 
 TEMPLATE = Path(__file__).with_name("template.py")  # a whole script; its construction is replaced
 BEGIN, END = "# --- the construction ---\n", "# --- what a step is in Blender ---\n"
 DIGITS = 7  # behind the point; Blender's own floats have about as many
 WIDTH = 100  # columns
+PICTURE_SIZE = 768  # pixels a side of the target, at most
 
 Point = tuple[float, float]
 
 
 def save_blender_script(
-    sequence: ConstructionSequence, path: str | os.PathLike[str], depth: float = 0.0, keyframes: bool = False
+    sequence: ConstructionSequence,
+    path: str | os.PathLike[str],
+    depth: float = 0.0,
+    keyframes: bool = False,
+    target: Silhouette | None = None,
 ) -> Path:
     """Write `blender_script` to a file, whole or not at all. Raises as it does, and OutputError."""
-    return write_atomically(path, blender_script(sequence, depth=depth, keyframes=keyframes))
+    return write_atomically(path, blender_script(sequence, depth=depth, keyframes=keyframes, target=target))
 
 
-def blender_script(sequence: ConstructionSequence, *, depth: float = 0.0, keyframes: bool = False) -> str:
+def blender_script(
+    sequence: ConstructionSequence, *, depth: float = 0.0, keyframes: bool = False, target: Silhouette | None = None
+) -> str:
     """The text of a Blender script (ASCII) that makes every step with Blender's operators and checks the counts.
 
     The mesh lies in the XY plane as in `to_obj`, y up. `depth` (units of the unit square) makes it a closed solid
-    below z = 0. `keyframes` makes an object for each step, shown one after the other on the time line. Whatever the
-    sequence holds of text is a string there, never code. docs/blender.md tells how to run it.
+    below z = 0. `keyframes` makes an object for each step, shown one after the other on the time line. A `target` is
+    laid under it as a reference image. Whatever the sequence holds of text is a string there, never code.
+    docs/blender.md tells how to run it.
 
     Raises SequenceError naming the step that cannot be replayed; ConfigError for a depth below 0 or not finite.
     """
@@ -46,9 +56,15 @@ def blender_script(sequence: ConstructionSequence, *, depth: float = 0.0, keyfra
         f"NAME = {sequence_name(sequence)!a}",
         f"DEPTH = {float(depth)!r}  # thickness, in units of the unit square; 0 is flat",
         f"KEYFRAMES = {bool(keyframes)}  # an object for every step, shown one after the other",
+        f"PICTURE = {_picture(target)!r}  # what is built, a PNG in base64, laid under the mesh",
     ]
     own = _own_code(sequence)
     return "\n".join([head + BEGIN, *constants, "\n", *_build(sequence, meshes), "\n", *own, END + tail])
+
+
+def _picture(target: Silhouette | None) -> str:
+    """A PNG in base64, white where the target is; "" for none."""
+    return "" if target is None else picture_url(target, (255, 255, 255), PICTURE_SIZE).partition(",")[2]
 
 
 def _build(sequence: ConstructionSequence, meshes: list[PolyMesh]) -> list[str]:

@@ -12,6 +12,7 @@ go by the numbers of the construction sequence, which stay with them as the attr
 """
 
 import argparse
+import base64
 import json
 import os
 import sys
@@ -27,6 +28,7 @@ import bmesh
 NAME = "a house"
 DEPTH = 0.0  # thickness, in units of the unit square; 0 is flat
 KEYFRAMES = False  # an object for every step, shown one after the other
+PICTURE = ""  # what is built, a PNG in base64, laid under the mesh
 
 
 def build() -> None:
@@ -366,7 +368,21 @@ def add_to_scene() -> bpy.types.Collection:
     bpy.context.view_layer.objects.active = objects[-1]
     if KEYFRAMES:
         add_keyframes(scene)
+    if PICTURE:
+        collection.objects.link(reference(base64.b64decode(PICTURE)))
     return collection
+
+
+def reference(png: bytes) -> bpy.types.Object:
+    """The picture in the unit square, under the mesh, as Add > Image > Reference makes one."""
+    image = bpy.data.images.new(NAME, 1, 1)
+    image.pack(data=png, data_len=len(png))
+    image.source = "FILE"
+    made = bpy.data.objects.new(f"{NAME} picture", None)
+    made.empty_display_type, made.data = "IMAGE", image
+    made.empty_display_size, made.location = 1.0, (0.5, 0.5, -0.01)
+    made.color, made.use_empty_image_alpha, made.hide_select = (1.0, 1.0, 1.0, 0.5), True, True
+    return made
 
 
 # --- files, when asked for on the command line ---

@@ -19,13 +19,14 @@ from typing import Any
 import numpy as np
 
 from autopoly_env.arrays import FloatArray
+from autopoly_env.export.byhand import Card, cards_of
 from autopoly_env.export.pictures import picture_url
 from autopoly_env.export.player.words import Words, describe_lesson, describe_start, describe_step
 from autopoly_env.export.replay import finite_meshes
 from autopoly_env.files import write_atomically
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.sequence import ConstructionSequence, Lesson, Step, parts_of
-from autopoly_env.sequence.effort import groups_to_move, seconds_of
+from autopoly_env.sequence.effort import seconds_of
 from autopoly_env.sequence.file import PlainScore
 from autopoly_env.sequence.ids import decoded
 from autopoly_env.silhouette import Silhouette
@@ -94,12 +95,12 @@ def _title(sequence: ConstructionSequence, target: Silhouette | None) -> str:
 def _page_data(sequence: ConstructionSequence, target: Silhouette | None, title: str) -> dict[str, Any]:
     meshes = finite_meshes(sequence)
     parts = parts_of(sequence)
-    steps = [_pose(sequence.start, sequence.start_score, describe_start(sequence.start))]
+    cards = cards_of(sequence)
+    steps = [_pose(sequence.start, sequence.start_score, describe_start(sequence.start), cards[0])]
+    steps[0]["part"] = parts.names[0]
     for number, (before, step, after) in enumerate(zip(meshes, sequence.steps, meshes[1:], strict=False), 1):
         motion = _motion(before, step, after)
-        in_place = set(step.created["vertices"]) if not groups_to_move(step, before, after) else set()
-        n_left = len(set(motion["moved"]) - in_place)
-        steps.append(_pose(after, step.score, describe_step(step, len(motion["moved"]), n_left)) | motion)
+        steps.append(_pose(after, step.score, describe_step(step, len(motion["moved"])), cards[number]) | motion)
         steps[-1]["seconds"] = round(seconds_of(step, before, after), 2)
         steps[-1]["part"] = parts.name(number)
     lost = sequence.settings.get("lost")
@@ -114,7 +115,7 @@ def _page_data(sequence: ConstructionSequence, target: Silhouette | None, title:
     }
 
 
-def _pose(mesh: PolyMesh, score: PlainScore, words: Words) -> dict[str, Any]:
+def _pose(mesh: PolyMesh, score: PlainScore, words: Words, card: Card) -> dict[str, Any]:
     """What the page knows of a step: where everything is after it, what it is worth and what there is to say."""
     ids = mesh.vertex_ids
     return {
@@ -126,7 +127,10 @@ def _pose(mesh: PolyMesh, score: PlainScore, words: Words) -> dict[str, Any]:
         "total": score["total"],
         "title": words.title,
         "done": words.done,
-        "keys": words.keys,
+        "lines": [{"words": line.words, "state": line.state} for line in card.lines],
+        "picks": card.picks,
+        "aims": {name: _rounded(np.array((x, 1.0 - y))) for name, (x, y) in card.aims.items()},
+        "why": card.why,
         "menu": words.menu,
         "blender": words.blender,
     }

@@ -30,6 +30,7 @@ from autopoly_env.operators import OPERATORS
 from autopoly_env.raster import coverage
 from autopoly_env.sequence import ConstructionSequence
 from benchmarks import replay_in_blender
+from tests.helpers.drawings import HOUSE, painted
 from tests.helpers.sequences import gabled, played, walked
 
 try:
@@ -249,6 +250,18 @@ with open(answer, "w") as stream:
 """
 
 
+REFERENCE = """
+import bpy, json, runpy, sys
+file, answer = sys.argv[-2:]
+sys.argv = ["blender"]
+runpy.run_path(file, run_name="__main__")
+(made,) = (o for o in bpy.data.objects if o.type == "EMPTY")
+with open(answer, "w") as stream:
+    size, alpha = list(made.data.size), list(made.data.pixels)[3::4]
+    json.dump([list(made.location), made.empty_display_size, size, alpha], stream)
+"""
+
+
 @dataclass(frozen=True)
 class Made:
     """What Blender made of everything, in a folder by name."""
@@ -285,6 +298,9 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Made:
     (folder / "shown.py").write_text(SHOWN, encoding="utf-8")
     for name, file in (("frames", folder / "house.py"), ("gltf", save_gltf(gabled(), folder / "house.glb", 0.1))):
         jobs[name] = Job(folder / "shown.py", (str(file), f"{folder / name}.json"))
+    save_blender_script(gabled(), folder / "backed.py", target=painted(HOUSE))
+    (folder / "reference.py").write_text(REFERENCE, encoding="utf-8")
+    jobs["reference"] = Job(folder / "reference.py", (f"{folder / 'backed.py'}", f"{folder / 'reference.json'}"))
     problems = dict(zip(jobs, run_in_blender(list(jobs.values()), seconds=600.0), strict=True))
     return Made(folder, sequences, problems)
 
@@ -321,6 +337,16 @@ def test_obj_from_blender__keeps_n_gons_and_the_silhouette(made: Made) -> None:
             assert iou(filled, coverage(mesh, RESOLUTION) >= 0.5) >= 0.995, name
             n_compared += 1
     assert n_compared >= 4
+
+
+@pytest.mark.slow
+@needs_blender
+def test_picture_under_the_mesh__lies_in_the_unit_square(made: Made) -> None:
+    assert made.problems["reference"] == ""
+    place, size, pixels, alpha = json.loads((made.folder / "reference.json").read_text(encoding="utf-8"))
+    mask = painted(HOUSE).mask
+    assert place == pytest.approx([0.5, 0.5, -0.01]) and size == 1.0 and pixels == list(mask.shape)
+    np.testing.assert_array_equal(np.array(alpha).reshape(mask.shape)[::-1] > 0.5, mask)  # Blender's rows begin below
 
 
 @pytest.mark.slow

@@ -94,10 +94,11 @@ def test_focus__is_seen_on_every_stop_of_the_tab_key(play: Open) -> None:
               element.closest("#mesh") ? mark.stroke : mark.outlineStyle];
     })()"""
     stops = []
-    for _ in range(7):
+    for _ in range(13):
         page.press("Tab")
         stops.append(page.evaluate(look))
-    assert [stop[0] for stop in stops[1:]] == ["step", "previous", "play", "next", "show-target", "opacity"]
+    controls = ["before", "after", "step", "previous", "play", "next", "speed", "show-names", "guess", "print"]
+    assert [stop[0] for stop in stops[1:]] == [*controls, "show-target", "opacity"]
     for _, width, kind in stops:
         assert width >= 2 and kind not in ("none", "transparent")
 

@@ -78,8 +78,8 @@ def test_page__names_parts_and_tells_what_steps_take_by_hand() -> None:
     assert [step["part"] for step in data["steps"][1:]] == ["body", "body", "lower right, 1 of 2", "lower left, 2 of 2"]
     assert [step["seconds"] for step in data["steps"][1:]] == [7.03, 7.03, 4.23, 4.23]
     assert data["lesson"] == ["23 s by hand", "3 parts", "0 returns", "67 % quads", "1 n-gon"]
-    cut, leg = data["steps"][1]["keys"], data["steps"][3]["keys"]
-    assert cut[-1].startswith("`G`") and leg[-1] == "`E`: pull the new edge out, click"  # which puts it in its place
+    cut, leg = ([line["words"] for line in data["steps"][k]["lines"]] for k in (1, 3))
+    assert "`G`" in cut[-1] and leg[-1].startswith("`E`: pull the new edge out")  # which puts it in its place
 
 
 def test_page__of_one_part_says_nothing_of_parts() -> None:
@@ -150,7 +150,7 @@ def test_save__is_whole_or_not_there(tmp_path: Path) -> None:
     assert save_html(house(), tmp_path / "new" / "player.html").read_text(encoding="utf-8") == to_html(house())
 
 
-def test_words__name_elements_and_keys_of_every_operator() -> None:
+def test_words__name_elements_of_every_operator() -> None:
     steps = (*house().steps, *chapel().steps)
     words = {step.operator: describe_step(step, len(step.moved)) for step in steps}
     assert words.keys() == OPERATORS.keys()
@@ -159,24 +159,10 @@ def test_words__name_elements_and_keys_of_every_operator() -> None:
     cut = "An edge loop is cut through 2 quads, across edge 0–1, and adds 3 vertices. All vertices stay."
     assert words["loop_cut"].done == cut
     assert words["face_inset"].done == "Face 6 gets a ring of 4 quads around its middle. All vertices stay."
-    assert words["edge_fill"].keys[0].endswith("click edge 1–4, `Shift` click edge 1–5")
     assert (
         words["edge_subdivide"].done == "Edge 0–1 gets vertex 4 in its middle. Then 1 vertex moves to fit the target."
     )
-    assert words["face_split"].keys[0].endswith("click vertex 4, `Shift` click vertex 2")
-    assert words["edge_extrude"].keys[-1].startswith("`G`")
     assert words["face_delete"].done == "Face 3 is deleted. All vertices stay."
-    keys = {"edge_subdivide": "Subdivide", "edge_extrude": "`E`", "face_split": "`J`", "face_delete": "`X` › Faces"}
-    keys |= {
-        "edge_cap": "`M` › At Center",
-        "edge_fill": "`F`",
-        "vertex_merge": "`M` › At Last",
-        "loop_cut": "`Ctrl` `R`",
-        "face_inset": "`I`",
-    }
-    keys |= {"face_hole": "`K`", "vertex_dissolve": "`Ctrl` `X`", "edge_dissolve": "`X` › Dissolve Edges"}
-    for operator, key in keys.items():
-        assert key in " ".join(words[operator].keys)
 
 
 def test_words__of_a_start_that_is_no_quad_count_its_faces() -> None:

@@ -104,7 +104,7 @@ def test_space_on_a_button__presses_that_button_only(play: Open) -> None:
 def test_parts__head_their_steps_in_the_list_and_stand_on_the_card(play: Open) -> None:
     page = play(table())
     heads = "[...document.querySelectorAll('#steps li')].map(item => item.querySelector('.part')?.textContent ?? '')"
-    assert page.evaluate(heads) == ["", "body", "", "lower right, 1 of 2", "lower left, 2 of 2"]
+    assert page.evaluate(heads) == ["body", "", "", "lower right, 1 of 2", "lower left, 2 of 2"]
     assert text(page, "#part") == "lower left, 2 of 2"
     assert text(page, "#seconds") == ", about 4 s"
     page.press("Home")
@@ -136,6 +136,55 @@ def test_play__runs_from_the_start_to_the_end_and_stops(play: Open) -> None:
     assert seen == ["Before step 1 of 3", "Step 1 of 3", "Step 2 of 3", "Step 3 of 3"]
 
 
+TOLD = "[...document.querySelectorAll('#names text')].map(text => text.textContent)"
+
+
+@needs_browser
+def test_before__shows_what_to_click_and_where_to_aim_and_after_names_what_is_new(play: Open) -> None:
+    page = play(at="#step-1")
+    assert page.evaluate(TOLD) == ["4"]
+    page.click("#before")
+    picked = "[...document.querySelectorAll('#mesh .pick')].map(element => element.getAttribute('aria-label'))"
+    assert page.evaluate(picked) == ["edge 0–1"]
+    assert page.evaluate(TOLD) == ["0–1"]
+    ring = "['cx', 'cy'].map(name => Number(document.querySelector('#aims circle').getAttribute(name)))"
+    assert page.evaluate(ring) == [500, 125]
+    assert page.evaluate("document.querySelectorAll('#vertices > g').length") == 4
+    assert text(page, "#count") == "1 / 7"
+    page.press("b")
+    assert page.evaluate("document.querySelectorAll('#vertices > g').length") == 5
+    assert page.evaluate("document.querySelectorAll('#aims *').length") == 0
+
+
+@needs_browser
+def test_guess__hides_the_step_until_it_is_asked_for(play: Open) -> None:
+    page = play(at="#step-2")
+    page.click("#guess")
+    page.click("#next")
+    hidden = (
+        "['#what', '#keys', '#why'].map(id => document.querySelector(id).checkVisibility({visibilityProperty: true}))"
+    )
+    assert page.evaluate(hidden) == [False] * 3
+    assert page.evaluate("document.querySelectorAll('#vertices > g').length") == 5 and page.evaluate(TOLD) == []
+    page.click("#reveal")
+    assert page.evaluate(hidden) == [True] * 3
+    assert page.evaluate("document.querySelectorAll('#vertices > g').length") == 7
+    assert page.problems() == []
+
+
+@needs_browser
+def test_print__has_a_card_for_each_step_with_the_mesh_before_and_after(play: Open) -> None:
+    page = play(target=wanted())
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    count = "[...document.querySelectorAll('#printed article')].map(card => card.querySelectorAll('svg').length)"
+    assert page.evaluate(count) == [1, *[2] * LAST]
+    assert page.evaluate("new Set([...document.querySelectorAll('mask')].map(mask => mask.id)).size") == 2 * LAST + 2
+    assert step_of(page) == LAST
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert page.evaluate("document.getElementById('printed').children.length") == 0
+    assert page.problems() == []
+
+
 @needs_browser
 def test_motion__grows_an_extrusion_out_of_its_edge_and_then_moves_it(play: Open) -> None:
     page = play(still=False, before=CLOCK, at="#step-2")
@@ -148,9 +197,9 @@ def test_motion__grows_an_extrusion_out_of_its_edge_and_then_moves_it(play: Open
         return [float(value) for value in page.evaluate(f"['cx', 'cy'].map(name => {circle}.getAttribute(name))")]
 
     page.press("ArrowRight")
-    assert corner(0.01) == pytest.approx((750, 750), abs=1)  # on vertex 2, from which it comes
-    assert corner(1300 * 0.45) == pytest.approx((875, 750), abs=1)  # where the operator puts it
-    halfway = corner(1300 * 0.725)
+    assert corner(1300 * 0.301) == pytest.approx((750, 750), abs=1)  # on vertex 2, from which it comes
+    assert corner(1300 * 0.55) == pytest.approx((875, 750), abs=1)  # where the operator puts it
+    halfway = corner(1300 * 0.775)
     assert halfway == pytest.approx((887.5, 725), abs=1)  # half of the refit
     assert corner(1300) == pytest.approx((900, 700), abs=0.1)
 
@@ -176,7 +225,7 @@ def test_motion__goes_through_any_construction_and_back(play: Open, seed: int) -
 def test_motion__fades_only_what_an_operator_takes_away(play: Open, k: int, fading: set[str]) -> None:
     page = play(still=False, before=CLOCK, at=f"#step-{k - 1}")
     page.press("ArrowRight")
-    page.evaluate("clock = 300; new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    page.evaluate("clock = 550; new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
     faint = page.evaluate(
         """[...document.querySelectorAll("#mesh g[role]")].filter(element => element.style.opacity < 1)
         .map(element => element.ariaLabel)"""
