@@ -143,7 +143,7 @@ def test_columns__show_how_the_constructions_read(run: Run) -> None:
     text = Path("out/table.md").read_text()
     assert "| agent | shapes | r_sm |" in text and "| agent | actions | valid | blocking_in | moved | quads |" in text
     refused = run("tiny.yaml", "--out", "other", "--columns", "beauty")
-    assert refused.code == 2 and "--columns beauty: 'beauty' is none; give some of lesson, r_sm" in refused.err
+    assert refused.code == 2 and "--columns beauty: 'beauty' is none; give some of all, lesson, r_sm" in refused.err
     assert not Path("other").exists()
 
 
