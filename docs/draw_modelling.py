@@ -15,7 +15,7 @@ from agents.registry import make_agent
 from agents.solution import Solution
 from autopoly_env.arrays import ByteArray
 from autopoly_env.export.sheet import save_png
-from autopoly_env.mesh import PolyMesh
+from autopoly_env.mesh import PolyMesh, face_rule
 from autopoly_env.sequence import Lesson
 from autopoly_env.silhouette import Silhouette, load_silhouette
 from autopoly_env.simulator import Simulator
@@ -30,7 +30,10 @@ PICTURES = ROOT / "docs" / "pictures"
 
 def solved(style: str, target: Silhouette) -> Solution:
     chosen = style_named(style)
-    game = Simulator(target, operators=chosen.operators, faces=chosen.faces)  # type: ignore[arg-type]
+    symmetry = None if chosen.symmetry == "off" else chosen.symmetry
+    game = Simulator(
+        target, operators=chosen.operators, faces=face_rule(chosen.faces), symmetry=symmetry, align=chosen.align
+    )
     return make_agent(chosen.agent).solve(game, Budget(REFITS))
 
 

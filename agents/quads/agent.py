@@ -28,7 +28,7 @@ class QuadsConfig:
 
     patience: int = 120  # hops in a row, from outline to outline, that may fail to find a better one
     n_polished: int = 8  # of the best outlines, that are refitted at the silhouette's own resolution
-    n_refits: int = 1500  # where the budget sets no limit
+    n_refits: int = 600  # where the budget sets no limit
     seed: int = 0
 
     def __post_init__(self) -> None:
