@@ -1,10 +1,14 @@
 """A mesh of quads and triangles as a construction: every face made in its turn, every vertex at once in its place."""
 
+from collections.abc import Iterator
+from dataclasses import replace
+
 import numpy as np
 
 from agents.quads.telling import Addition, order_of
 from agents.trace.construct import Builder, UnbuildableError, grow_quad
 from autopoly_env.arrays import FloatArray
+from autopoly_env.errors import AutoPolyError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.simulator import Simulator, State
 
@@ -16,19 +20,42 @@ OPERATORS = (
     "face_delete",
     "vertex_dissolve",
 )  # that the telling may need
+_N_STARTS = 3  # faces to begin with, the largest, that are tried until a ring can be closed
 _BULGE = 0.05  # of its length, that a side of a triangle stands out while it has a corner in it
 _SHY = 0.2  # share of the way to the middle of its face by which a corner stays away from the one it is welded to
 
 
 def build(simulator: Simulator, mesh: PolyMesh) -> list[State]:
     """The states that build `mesh` up to numbering. Raises UnbuildableError where the operators cannot."""
-    additions = iter(order_of(mesh))
+    for deep in (True, False):
+        for rank in range(_N_STARTS):
+            try:
+                return _built(simulator, mesh, order_of(mesh, rank, deep))
+            except UnbuildableError as error:
+                last = error
+    raise last
+
+
+def _built(simulator: Simulator, mesh: PolyMesh, additions: Iterator[Addition]) -> list[State]:
     first = next(additions)
     builder = Builder(simulator, PolyMesh.from_faces(mesh.vertices[list(first.face)], [range(len(first.face))]))
     id_of = dict(zip(first.face, range(len(first.face)), strict=True))
     for addition in additions:
-        id_of |= _add(builder, mesh.vertices, addition, id_of)
+        id_of |= _add_somehow(builder, mesh.vertices, addition, id_of)
     return builder.states
+
+
+def _add_somehow(builder: Builder, points: FloatArray, addition: Addition, id_of: dict[int, int]) -> dict[int, int]:
+    """`_add`, or the same face from another of its edges that is there; raises UnbuildableError if none will do."""
+    kept = len(builder.states)
+    turned = [(*addition.face[k:], *addition.face[:k]) for k in range(1, len(addition.face))]
+    others = [replace(addition, face=face, kind="weld") for face in turned if face[0] in id_of and face[1] in id_of]
+    for way in (addition, *others):
+        try:
+            return _add(builder, points, way, id_of)
+        except AutoPolyError:
+            del builder.states[kept:]
+    raise UnbuildableError(f"no operator makes the face {addition.face}")
 
 
 def _add(builder: Builder, points: FloatArray, addition: Addition, id_of: dict[int, int]) -> dict[int, int]:

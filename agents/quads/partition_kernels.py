@@ -9,9 +9,11 @@ import numpy as np
 from autopoly_env.arrays import BoolArray, FloatArray, IntArray
 from autopoly_env.compute import kernel
 from autopoly_env.mesh.corner_kernels import turn
+from autopoly_env.mesh.geometry_kernels import CLEARANCE
 from autopoly_env.mesh.planar_kernels import enters_cone, segments_touch
 
 UGLINESS = 0.1  # what the worst corner of a face costs at most, in elements
+LEAST_GAP = 3.0 * CLEARANCE  # between opposite sides of a quad, so that a refit leaves room to build it
 BENDING = 2.0  # what it costs for each unit of sine that a corner has to be bent to be allowed
 
 
@@ -39,7 +41,8 @@ def least_costs(
     """Cost (n, n) of cutting what lies beyond each chord i < j, and the face (n, n, 2) on that chord: corners k, m.
 
     m is -1 for a triangle. The cost of a face is 2, itself and an edge, and up to `UGLINESS` for its worst corner. No
-    corner of a face turns by less than `least_sine`, of which a quad may lack `bend`. Klincsek 1980, with quads as well
+    corner of a face turns by less than `least_sine`, of which a quad may lack `bend`; no quad is thinner than
+    `LEAST_GAP`. Klincsek 1980, with quads as well
     as triangles: O(n^4).
     """
     n = len(points)
@@ -71,9 +74,28 @@ def least_costs(
                     if worst >= least_sine - bend and names[i] != names[m] and names[k] != names[j]:
                         total = cost[i, k] + cost[k, m] + cost[m, j] + 2.0 + UGLINESS * (1.0 - worst)
                         total += BENDING * max(0.0, least_sine - worst)
-                        if total < cost[i, j]:
+                        if total < cost[i, j] and _is_thick(points, i, k, m, j):
                             cost[i, j], faces[i, j, 0], faces[i, j, 1] = total, k, m
     return cost, faces
+
+
+@kernel
+def _is_thick(points: FloatArray, a: int, b: int, c: int, d: int) -> bool:
+    """Whether opposite sides of a convex quad are so far apart that both may be boundary edges while it is built."""
+    least = min(
+        min(_gap(points, a, c, d), _gap(points, b, c, d), _gap(points, c, a, b), _gap(points, d, a, b)),
+        min(_gap(points, b, d, a), _gap(points, c, d, a), _gap(points, d, b, c), _gap(points, a, b, c)),
+    )
+    return least >= LEAST_GAP
+
+
+@kernel
+def _gap(points: FloatArray, p: int, a: int, b: int) -> float:
+    """Distance of corner p from the side between a and b."""
+    dx, dy = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
+    x, y = points[p, 0] - points[a, 0], points[p, 1] - points[a, 1]
+    share = min(1.0, max(0.0, (x * dx + y * dy) / (dx * dx + dy * dy)))
+    return np.hypot(x - share * dx, y - share * dy)
 
 
 @kernel

@@ -20,26 +20,32 @@ class Addition:
     """A face in its turn: what it hangs on, and what is there of it."""
 
     face: Face  # begins with the edge a, b that it hangs on, as that face runs: the neighbour has b, a
-    kind: str  # "extrude", "cap", "fill", "weld": what makes it; "apart": a part of its own
+    kind: str  # "extrude", "cap", "fill", "weld": what makes it; "apart": a part of its own; "touch": nothing does
     part: int  # number of the branch that it belongs to, 0 for the body
 
 
-def order_of(mesh: PolyMesh) -> Iterator[Addition]:
-    """The faces of a mesh in the order in which they are modelled; each part of the mesh after the other."""
+def order_of(mesh: PolyMesh, rank: int = 0, deep: bool = True) -> Iterator[Addition]:
+    """The faces of a mesh in the order in which they are modelled; each part of the mesh after the other.
+
+    It begins with the face that is largest but `rank`. Unless `deep`, all branches grow at once.
+    """
     areas = mesh.face_areas()
     waiting = set(range(len(mesh.faces)))
     n_parts = 0
     while waiting:
         quads = [f for f in waiting if len(mesh.faces[f]) == 4]
-        start = max(quads or waiting, key=lambda f: (areas[f], -f))
+        starts = sorted(quads or waiting, key=lambda f: (-areas[f], f))
+        start = starts[min(rank, len(starts) - 1)]
         yield Addition(mesh.faces[start], "start" if len(waiting) == len(mesh.faces) else "apart", n_parts)
-        for addition in _outwards(mesh, start, areas, waiting, n_parts):
+        for addition in _outwards(mesh, start, areas, waiting, n_parts, deep):
             n_parts = max(n_parts, addition.part)
             yield addition
         n_parts += 1
 
 
-def _outwards(mesh: PolyMesh, start: int, areas: FloatArray, waiting: set[int], first_part: int) -> Iterator[Addition]:
+def _outwards(
+    mesh: PolyMesh, start: int, areas: FloatArray, waiting: set[int], first_part: int, deep: bool
+) -> Iterator[Addition]:
     """The faces that hang together with `start`, taken out of `waiting`."""
     sides = {pair: f for f, face in enumerate(mesh.faces) for pair in pairwise((*face, face[0]))}
     built_edges: set[tuple[int, int]] = set()  # as the built faces run
@@ -61,7 +67,9 @@ def _outwards(mesh: PolyMesh, start: int, areas: FloatArray, waiting: set[int], 
             neighbour = sides.get((b, a))
             if f in waiting and neighbour in age:
                 kind = _kind(mesh.faces[f], (a, b), built_edges, built_vertices)
-                ways.append((_RANK[kind], -age[neighbour], -areas[f], f, (a, b), kind, neighbour))
+                ways.append(
+                    (_RANK[kind], -age[neighbour] if deep else age[neighbour], -areas[f], f, (a, b), kind, neighbour)
+                )
         if not ways:
             return
         _, _, _, f, (a, b), kind, neighbour = min(ways)
@@ -74,22 +82,25 @@ def _outwards(mesh: PolyMesh, start: int, areas: FloatArray, waiting: set[int], 
         yield Addition(_turned(mesh.faces[f], a, b), kind, branch)
 
 
-_RANK = {"extrude": 0, "cap": 0, "fill": 1, "weld": 2}
+_RANK = {"extrude": 0, "cap": 0, "fill": 1, "weld": 2, "touch": 3}
 
 
 def _kind(face: Face, base: tuple[int, int], built_edges: set[tuple[int, int]], built_vertices: set[int]) -> str:
-    """What makes a face that hangs on the edge `base` of its own."""
+    """What makes a face that hangs on the edge `base` of its own.
+
+    A corner that is there already can be welded to where a side beside the base is; else the two would only touch.
+    """
     others = [v for v in face if v not in base and v in built_vertices]
     if not others:
         return "extrude" if len(face) == 4 else "cap"
-    if len(others) < len(face) - 2:
-        return "weld"
     around = list(pairwise((*face, face[0])))
     there = [(a, b) for a, b in around if (b, a) in built_edges and (a, b) != base]
     if len(face) == 3:
-        return "fill" if there else "weld"
-    opposite = around[(around.index(base) + 2) % 4]
-    return "fill" if opposite in there else "weld"
+        return "fill" if there else "touch"
+    if around[(around.index(base) + 2) % 4] in there:
+        return "fill"
+    beside = {v for pair in there for v in pair if set(pair) & set(base)}
+    return "weld" if beside.issuperset(others) else "touch"
 
 
 def _turned(face: Face, a: int, b: int) -> Face:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import shapely
 
 from agents.budget import Budget, Meter
 from agents.quads.agent import QuadsAgent, QuadsConfig
@@ -15,6 +16,7 @@ from agents.trace.rings import Ring
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import broken_faces
 from autopoly_env.simulator import Simulator
+from tests.helpers.drawings import painted
 from tests.helpers.rings import BOX, hole, regular, small
 from tests.helpers.solving import simulator
 
@@ -51,6 +53,18 @@ def test_mcts__goes_on_from_it_under_the_rule() -> None:
     both = make_agent("mcts", n_simulations=2, patience=1).solve(game("island"), Budget(150))
     assert both.score.total >= alone.score.total - 1e-9
     assert all(broken_faces(mesh, "quads") == [] for mesh in both.sequence.meshes())
+
+
+@pytest.mark.slow
+def test_ladder__is_built_with_all_of_its_holes() -> None:
+    """Its rings can be closed in some orders only: where two corners meet beside an edge that both faces have."""
+    ladder = shapely.box(0.3, 0.1, 0.7, 0.9)
+    for k in range(4):
+        ladder -= shapely.box(0.36, 0.16 + 0.18 * k, 0.64, 0.28 + 0.18 * k)
+    crooked = shapely.affinity.rotate(ladder, 8.0)
+    target = Simulator(painted(crooked, 256), **QUADS)  # type: ignore[arg-type]
+    solution = make_agent("quads").solve(target, Budget(300))
+    assert solution.mesh.topology.n_holes == 4 and solution.score.iou > 0.95
 
 
 @pytest.mark.slow
