@@ -29,7 +29,7 @@ class Agent(ABC):
     config_class: ClassVar[type[Any] | None] = None  # a dataclass, all with defaults, that __init__ takes one of
     runs_simulations = False  # what a budget may limit
     takes_guidance = True  # a start mesh and locked vertices, which the transitions it plays keep to
-    takes_symmetry = True
+    takes_symmetry = True  # the last mesh is symmetric where that is asked for
     takes_faces = True  # a rule of faces, which these transitions keep as well
 
     def check(self, simulator: Simulator) -> None:

@@ -79,13 +79,10 @@ def check_solution(solution: Solution, simulator: Simulator) -> None:
     scores = [sequence.start_score, *(step.score for step in sequence.steps)]
     for number, (mesh, score) in enumerate(zip(meshes, scores, strict=True)):
         _require(simulator.final_score(mesh).as_dict() == score, f"step {number}: the score is not its `final_score`")
-    if simulator.guidance.axis is not None:
-        totals = [
-            score["total"] for mesh, score in zip(meshes, scores, strict=True) if simulator.guidance.is_symmetric(mesh)
-        ]
-        _require(max(totals, default=scores[-1]["total"]) == scores[-1]["total"], "it goes on after its best mesh")
-    elif not simulator.weights.w_locality:  # which may make it worth its while to stop early
-        _require(sequence.best_prefix() == sequence, "the sequence goes on after its best mesh")
+    if not simulator.weights.w_locality:  # which may make it worth its while to stop early
+        ends = [k for k, mesh in enumerate(meshes) if simulator.guidance.is_symmetric(mesh)]
+        best = max(ends, key=lambda k: (scores[k]["total"], -k), default=len(meshes) - 1)
+        _require(best == len(meshes) - 1, "the sequence goes on after its best mesh")
     n_new = len(sequence.steps) - (0 if simulator.guidance.earlier is None else len(simulator.guidance.earlier.steps))
     most = simulator.max_steps * (1 if simulator.guidance.axis is None else 2)  # an action and its mirror image
     _require(n_new <= most, f"{n_new} steps: max_steps = {simulator.max_steps} is not kept")

@@ -145,17 +145,20 @@ def _choose(to: str | None, out: Path | None, n: int) -> Format:
     if out is None or not out.suffix or os.path.isdir(out):
         return named or find_format(DEFAULT)
     if n > 1:  # to go into a folder, which may have a dot in its name
-        if out.suffix.lower() in {
-            Path(f"_{suffix}").suffix for other in formats().values() for suffix in other.suffixes
-        }:
+        if any(_ends_as(out, other) for other in formats().values()):
             raise ConfigError(f"--out {out}: one file for {n} sequences; give a folder")
         return named or find_format(DEFAULT)
     if named is None:
         return format_of(out)
-    if out.suffix.lower() not in {Path(f"_{suffix}").suffix for suffix in named.suffixes}:
+    if not _ends_as(out, named):
         endings = " or ".join(named.suffixes)
         raise ConfigError(f"--out {out} with --to {to}: expected a file name that ends in {endings}; leave one out")
     return named
+
+
+def _ends_as(out: Path, made: Format) -> bool:
+    """Whether a file of that format may have such an ending, the last one of it."""
+    return out.suffix.lower() in {Path(f"_{suffix}").suffix for suffix in made.suffixes}
 
 
 _WHY = {"depth": "is flat", "target": "shows no target", "size": "has a size of its own"}

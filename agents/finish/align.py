@@ -63,8 +63,7 @@ def aligned(simulator: Simulator, mesh: PolyMesh) -> PolyMesh:
     if len(mesh.vertices) > MANY_VERTICES:
         return mesh
     frame = _Frame(simulator, mesh)
-    found = sorted(regularities(mesh), key=lambda regularity: regularity.off)
-    frame.impose(found)
+    frame.impose(sorted(regularities(mesh), key=lambda regularity: regularity.off))
     return frame.fitted()
 
 
@@ -80,7 +79,7 @@ def regularities(mesh: PolyMesh) -> list[Regularity]:
             off = abs(float(points[list(one), axis].mean() - points[list(other), axis].mean()))
             if off <= NEAR_PLACE and not set(one) & set(other):
                 found.append(Regularity(kind, (one[0], other[0]), off))
-    turned = set(upright) | set(level)
+    turned = set(map(frozenset, (*upright, *level)))
     for face in mesh.faces:
         if len(face) == 4:
             a, b, c, d = face
@@ -95,7 +94,7 @@ def _near_axis(points: FloatArray, edges: Sequence[_Edge], axis: int) -> list[_E
     return [edges[k] for k in np.flatnonzero(ways[:, axis] <= np.tan(NEAR_ANGLE) * ways[:, 1 - axis]).tolist()]
 
 
-def _of_sides(points: FloatArray, one: _Edge, other: _Edge, turned: set[_Edge]) -> list[Regularity]:
+def _of_sides(points: FloatArray, one: _Edge, other: _Edge, turned: set[frozenset[int]]) -> list[Regularity]:
     """What two opposite sides of a quad nearly are to each other."""
     u, w = points[one[1]] - points[one[0]], points[other[1]] - points[other[0]]
     long, short = float(np.hypot(*u)), float(np.hypot(*w))
@@ -103,8 +102,7 @@ def _of_sides(points: FloatArray, one: _Edge, other: _Edge, turned: set[_Edge]) 
         return []
     found = []
     sine = abs(float(u[0] * w[1] - u[1] * w[0])) / (long * short)
-    are_turned = all(min(e, e[::-1]) in turned or max(e, e[::-1]) in turned for e in (one, other))
-    if sine <= np.sin(NEAR_ANGLE) and not are_turned:
+    if sine <= np.sin(NEAR_ANGLE) and not turned.issuperset(map(frozenset, (one, other))):
         found.append(Regularity("parallel", (*one, *other), sine * min(long, short)))
     if abs(long - short) <= NEAR_LENGTH * max(long, short):
         found.append(Regularity("equal", (*one, *other), abs(long - short)))
@@ -130,8 +128,8 @@ class _Frame:
         if not regularities:
             return
         wanted = [*self._imposed, *regularities]
-        points = self._with(wanted)
-        if points is not None and self._may_be(points):
+        points = self._met(self._start.vertices, wanted)
+        if points is not None and self._iou(points) >= self._least_iou and self._may_be(points):
             self._imposed, self.mesh = wanted, self.mesh.with_vertices(points)
         elif len(regularities) > 1:
             half = len(regularities) // 2
@@ -148,8 +146,9 @@ class _Frame:
         for step in (1.0, 0.5, 0.25):
             for way in (sign * step * pixel * way for way in ways for sign in (1.0, -1.0)):
                 moved = best + way
-                if self._iou(moved) > iou and self._may_be(moved):
-                    best, iou = moved, self._iou(moved)
+                gained = self._iou(moved)
+                if gained > iou and self._may_be(moved):
+                    best, iou = moved, gained
         met = self._met(best, self._imposed)
         if met is not None and self._iou(met) > self._iou(self.mesh.vertices) and self._may_be(met):
             return self.mesh.with_vertices(met)
@@ -173,15 +172,11 @@ class _Frame:
     def _iou(self, points: FloatArray) -> float:
         return self._simulator.final_score(self.mesh.with_vertices(points)).iou
 
-    def _with(self, wanted: Sequence[Regularity]) -> FloatArray | None:
-        """Places (V, 2) that meet the equations, near those of the start; None where there are none near by."""
-        return self._met(self._start.vertices, wanted)
-
     def _equations(self, wanted: Sequence[Regularity], points: FloatArray) -> list[tuple[float, FloatArray]]:
         return [regularity.residual(points) for regularity in wanted] + list(self._bound(points))
 
     def _met(self, points: FloatArray, wanted: Sequence[Regularity]) -> FloatArray | None:
-        """The places nearest to `points` that meet the equations; None where there are none near by."""
+        """The places (V, 2) nearest to `points` that meet the equations; None where none are near the start."""
         for _ in range(_N_NEWTON):
             rows = self._equations(wanted, points)
             missing, slopes = np.array([m for m, _ in rows]), np.array([slope for _, slope in rows])
@@ -207,14 +202,11 @@ class _Frame:
         return rows
 
     def _may_be(self, points: FloatArray) -> bool:
+        """Whether the vertices may lie there, whatever the IoU."""
         if ((points < 0.0) | (points > 1.0)).any():
             return False
-        simulator, mesh = self._simulator, self.mesh.with_vertices(points)
-        return (
-            simulator.final_score(mesh).iou >= self._least_iou
-            and simulator.is_sane(mesh)
-            and simulator.off(mesh) <= self._most_off
-        )
+        mesh = self.mesh.with_vertices(points)
+        return self._simulator.is_sane(mesh) and self._simulator.off(mesh) <= self._most_off
 
 
 def _ties_made_exact(points: FloatArray, wanted: Sequence[Regularity], locked: BoolArray) -> FloatArray:

@@ -7,6 +7,7 @@ import numpy as np
 
 from agents.trace.outline import Outline, nested
 from autopoly_env.arrays import FloatArray, IntArray
+from autopoly_env.mesh.symmetry import mirrored
 
 _ON_AXIS = 0.002  # distance (unit square) from the axis within which a vertex is put on it
 
@@ -68,6 +69,4 @@ def _stretches(where: IntArray) -> Iterator[IntArray]:
 
 def _image(points: FloatArray, axis: float) -> FloatArray:
     """The mirror image of a chain, run backwards."""
-    image = points[::-1].copy()
-    image[:, 0] = 2.0 * axis - image[:, 0]
-    return image
+    return mirrored(points[::-1], axis)

@@ -37,7 +37,7 @@ _LEAST_GAIN = 1e-9
 
 def explore(hill: QuadHill, patience: int, rng: np.random.Generator, meter: Meter) -> Iterator[QuadPlace]:
     """Places worth keeping, until `patience` hops in a row found no better one."""
-    price = max(hill.simulator.weights.w_sc, _LEAST_PRICE)
+    price = _price(hill)
     seeds = _seeds(hill, meter)
     arms: list[QuadPlace] = []
     for seed in islice(seeds, _N_FIRST):
@@ -111,6 +111,11 @@ def _hop_from(
     return climbed(hill, place, meter)
 
 
+def _price(hill: QuadHill) -> float:
+    """Of an element, as losses are measured."""
+    return max(hill.simulator.weights.w_sc, _LEAST_PRICE)
+
+
 def _seeds(hill: QuadHill, meter: Meter) -> Iterator[QuadPlace]:
     """Traced outlines to climb from: of the silhouette, with fewer holes, and with thin parts or gaps gone."""
     rings = trace_rings(hill.simulator.silhouette)
@@ -141,14 +146,14 @@ def _fitted(hill: QuadHill, contours: Iterable[list[Ring]], meter: Meter) -> lis
 def _best_of_each_kind(places: Iterable[QuadPlace], hill: QuadHill) -> list[QuadPlace]:
     """The best with each number of rings, then with each number of vertices, about, then the others."""
     ordered = sorted(places, key=total_of, reverse=True)
-    least = ordered[0].total - _HOPELESS * max(hill.simulator.weights.w_sc, _LEAST_PRICE) if ordered else 0.0
+    least = ordered[0].total - _HOPELESS * _price(hill) if ordered else 0.0
     seen: set[tuple[int, ...]] = set()
     tiers: tuple[list[QuadPlace], ...] = ([], [], [])
     for place in ordered:
         n_rings, octave = len(place.outline.rings), round(_PER_OCTAVE * math.log2(len(place.outline.loops.vertices)))
-        tier = 0 if (n_rings,) not in seen else 1 if (n_rings, octave) not in seen else 2
-        if place.total <= least:
-            tier = 2
+        tier = 2
+        if place.total > least and (n_rings, octave) not in seen:
+            tier = int((n_rings,) in seen)
         seen |= {(n_rings,), (n_rings, octave)}
         if all(abs(place.total - other.total) > _SAME for other in chain.from_iterable(tiers)):
             tiers[tier].append(place)

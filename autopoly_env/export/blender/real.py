@@ -49,11 +49,35 @@ def run_in_blender(jobs: Sequence[Job], *, seconds: float = 600.0) -> list[str]:
 
     Raises ConfigError if there is no Blender; OutputError if it breaks down or takes longer than `seconds`.
     """
+    asked = [[str(job.script.resolve()), *job.arguments] for job in jobs]
+    problems: list[str] = ask_blender(DRIVER, asked, what="scripts", seconds=seconds)
+    return problems
+
+
+def ask_blender(
+    driver: Path,
+    question: Any,
+    *,
+    what: str,
+    seconds: float,
+    screen: Sequence[str] = (),
+    look: Sequence[str] = ("-b",),
+    options: Sequence[str] = (),
+    ends_well: bool = True,
+) -> Any:
+    """What a driver, run in Blender on a file with a question, leaves in a file of its answer; both are JSON.
+
+    Blender is started by `screen`, if that is given, and with the options `look`; the driver is given `options` after
+    the files. Unless it has to have ended well, an answer is enough.
+    Raises ConfigError if there is no Blender; OutputError if it breaks down or takes longer than `seconds`, with the
+    advice to give fewer of `what`.
+    """
     program = find_blender()
     with tempfile.TemporaryDirectory() as folder:
-        asked, answer = Path(folder, "jobs.json"), Path(folder, "problems.json")
-        asked.write_text(json.dumps([[str(job.script.resolve()), *job.arguments] for job in jobs]), encoding="utf-8")
-        command = [program, "-b", "--factory-startup", "--python", str(DRIVER), "--", str(asked), str(answer)]
+        asked, answer = Path(folder, "question.json"), Path(folder, "answer.json")
+        asked.write_text(json.dumps(question), encoding="utf-8")
+        command = [*screen, program, *look, "--factory-startup", "--python", str(driver)]
+        command += ["--", str(asked), str(answer), *options]
         try:
             done = subprocess.run(
                 command,
@@ -65,14 +89,13 @@ def run_in_blender(jobs: Sequence[Job], *, seconds: float = 600.0) -> list[str]:
                 errors="replace",
             )
         except subprocess.TimeoutExpired:
-            raise OutputError(f"Blender was stopped after {seconds:g} s; give fewer scripts or more time") from None
+            raise OutputError(f"Blender was stopped after {seconds:g} s; give fewer {what} or more time") from None
         except OSError as error:
-            raise ConfigError(f"{program} cannot be run ({error.strerror}); set {VARIABLE} to Blender") from None
-        if done.returncode or not answer.exists():
+            raise ConfigError(f"{command[0]} cannot be run ({error.strerror}); set {VARIABLE} to Blender") from None
+        if (done.returncode and ends_well) or not answer.exists():
             last = (done.stdout.strip().splitlines() or ["it said nothing"])[-1]
             raise OutputError(f"Blender broke down with exit code {done.returncode} ({last}); try another version")
-        problems: list[str] = json.loads(answer.read_text(encoding="utf-8"))
-        return problems
+        return json.loads(answer.read_text(encoding="utf-8"))
 
 
 def mismatches(sequence: ConstructionSequence, report: dict[str, Any]) -> list[str]:

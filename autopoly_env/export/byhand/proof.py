@@ -1,10 +1,7 @@
 """Cards proved: real Blender does what they say, act by act, and has then what they say, and the sequence's meshes."""
 
-import json
 import os
 import shutil
-import subprocess
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from autopoly_env.errors import ConfigError, OutputError
-from autopoly_env.export.blender import find_blender
+from autopoly_env.export.blender import ask_blender
 from autopoly_env.export.byhand.cards import Card, cards_of
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.sequence import ConstructionSequence
@@ -69,33 +65,18 @@ def prove(
 def _asked(
     acts: list[list[list[dict[str, Any]]]], screen: Sequence[str], events: Sequence[str], seconds: float
 ) -> list[dict[str, Any]]:
-    with tempfile.TemporaryDirectory() as folder:
-        asked, answer = Path(folder, "cards.json"), Path(folder, "answer.json")
-        asked.write_text(json.dumps(acts), encoding="utf-8")
-        given = ["--factory-startup", "--python", str(DRIVER), "--", str(asked), str(answer)]
-        command = [find_blender(), "-b", *given]
-        if screen:
-            window = ["--enable-event-simulate", "--window-geometry", "0", "0", *map(str, WINDOW)]
-            command = [*screen, command[0], *window, *given, "--events", ",".join(events)]
-        try:
-            done = subprocess.run(
-                command,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.STDOUT,
-                timeout=seconds,
-                encoding="utf-8",
-                errors="replace",
-            )
-        except subprocess.TimeoutExpired:
-            raise OutputError(f"Blender was stopped after {seconds:g} s; give fewer cards or more time") from None
-        except OSError as error:
-            raise ConfigError(f"{command[0]} cannot be run ({error.strerror}); set BLENDER to Blender") from None
-        if not answer.exists():
-            last = (done.stdout.strip().splitlines() or ["it said nothing"])[-1]
-            raise OutputError(f"Blender broke down with exit code {done.returncode} ({last}); try another version")
-        answers: list[dict[str, Any]] = json.loads(answer.read_text(encoding="utf-8"))
-        return answers
+    window = ("--enable-event-simulate", "--window-geometry", "0", "0", *map(str, WINDOW))
+    answers: list[dict[str, Any]] = ask_blender(
+        DRIVER,
+        acts,
+        what="cards",
+        seconds=seconds,
+        screen=screen,
+        look=window if screen else ("-b",),
+        options=("--events", ",".join(events)) if screen else (),
+        ends_well=False,
+    )
+    return answers
 
 
 def _proof(sequence: ConstructionSequence, deck: list[Card], answer: dict[str, Any]) -> Proof:
