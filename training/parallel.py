@@ -6,6 +6,7 @@ result depends on its task only; a task that needs random numbers carries its se
 
 import contextlib
 import multiprocessing
+import multiprocessing.resource_tracker
 import os
 import pickle
 import signal
@@ -187,6 +188,8 @@ class _Worker:
         context = multiprocessing.get_context("spawn")
         self.pipe, end = context.Pipe()
         self._process = context.Process(target=_work, args=(end, function), daemon=True)
+        # The first start of a process starts Python's resource tracker, and that lets interrupts through again.
+        multiprocessing.resource_tracker.ensure_running()
         with _environment(ONE_THREAD), _no_interrupts():
             self._process.start()
         end.close()

@@ -196,3 +196,21 @@ def test_ctrl_c__while_a_worker_starts_waits_until_it_has_started(monkeypatch: p
         another.join()
     assert len(started) == 1
     assert wait_until(lambda: not started[0].is_alive())
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="the masks of processes are read from /proc")
+def test_worker__is_deaf_to_ctrl_c_from_its_first_moment() -> None:
+    # In a process of its own: Python starts more than the worker where it is the first one.
+    script = (
+        "from pathlib import Path\n"
+        "from tests.helpers.odd_jobs import do\n"
+        "from training.parallel import _Worker\n"
+        "if __name__ == '__main__':\n"
+        "    worker = _Worker(do)\n"
+        "    status = Path(f'/proc/{worker._process.pid}/status').read_text()\n"
+        "    print(next(line for line in status.splitlines() if line.startswith('SigBlk')).split()[1])\n"
+        "    worker.stop()\n"
+    )
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=ROOT)
+    assert run.stderr == ""
+    assert int(run.stdout, 16) >> signal.SIGINT - 1 & 1
