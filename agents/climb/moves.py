@@ -9,9 +9,9 @@ import shapely
 from agents.trace.outline import Outline, outline_of
 from agents.trace.rings import Ring, signed_area
 from autopoly_env.arrays import FloatArray
-from autopoly_env.operators import Action
+from autopoly_env.operators import operator_named
 from autopoly_env.operators.face_hole import hole_shapes
-from autopoly_env.placement import Disagreement, tried
+from autopoly_env.placement import Disagreement
 from autopoly_env.silhouette import Silhouette
 
 _NEW_RING_SIZES = (3, 4, 5, 6, 8)
@@ -92,7 +92,7 @@ def grown_at(outline: Outline, disagreement: Disagreement, row: int, operator: s
     """One (edge_subdivide) or two (edge_extrude) vertices more in the boundary edge of that row."""
     loops = outline.loops
     a, b = loops.topology.boundary_half_edges[row].tolist()
-    start = tried(disagreement, Action(operator, loops.edge_index(a, b))).starts[0]
+    [start] = operator_named(operator).starts(disagreement, loops.edge_index(a, b), 1)
     new_points = start.mesh.vertices[len(loops.vertices) :]
     ends = np.cumsum([len(ring.points) for ring in outline.rings])
     k = int(np.searchsorted(ends, a, side="right"))

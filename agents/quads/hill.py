@@ -45,11 +45,10 @@ class QuadHill:
         self._pixels = simulator.silhouette.target(simulator.finest)
         self.axis = simulator.guidance.axis  # about which outlines are symmetric, None where they need not be
 
-    def place(self, outline: Outline) -> QuadPlace:
-        """The outline as it is, cut at its best, or bent a little where that saves faces."""
-        score = outline.score(self._pixels, self.simulator.weights)
+    def place(self, outline: Outline, iou: float | None = None) -> QuadPlace:
+        """The outline as it is, cut at its best, or bent a little where that saves faces; `iou` where it is known."""
         partition = partitioned(outline)
-        place = self._cut(outline, partition, score)
+        place = self._cut(outline, partition, self._iou(outline) if iou is None else iou)
         if partition is not None and len(partition.faces) <= least_faces(outline):
             return place
         relaxed = partitioned(outline, MOST_BENT)
@@ -59,23 +58,25 @@ class QuadHill:
         if mesh is None:
             return place
         moved = outline.moved(outline.loops.with_vertices(mesh.vertices))
-        return max(place, self._cut(moved, relaxed, moved.score(self._pixels, self.simulator.weights)), key=total_of)
+        return max(place, self._cut(moved, relaxed, self._iou(moved)), key=total_of)
 
-    def promise(self, outline: Outline) -> float:
+    def _iou(self, outline: Outline) -> float:
+        return intersection_over_union(outline.loops, self._pixels)
+
+    def _promise(self, outline: Outline, iou: float) -> float:
         """What an outline is worth as it is, if it can be cut as well as can be."""
-        iou = intersection_over_union(outline.loops, self._pixels)
         weights = self.simulator.weights
         return weights.w_sm * iou - weights.w_sc * complexity_of(outline, least_faces(outline))
 
-    def _cut(self, outline: Outline, partition: Partition | None, score: Score) -> QuadPlace:
-        w_sc = self.simulator.weights.w_sc
+    def _cut(self, outline: Outline, partition: Partition | None, iou: float) -> QuadPlace:
+        weights = self.simulator.weights
         if partition is None:
+            score = outline.scored(iou, outline.complexity, weights)
             return QuadPlace(outline, None, score, score.total - _UNCUT)
-        complexity = complexity_of(outline, len(partition.faces))
-        total = score.total - w_sc * (complexity - score.complexity)
-        off = w_sc * _TRIANGLE * (len(partition.faces) - partition.n_quads) + self.simulator.off(outline.loops)
-        score = Score(score.iou, complexity, score.self_intersections, total)
-        return QuadPlace(outline, partition, score, total - off)
+        score = outline.scored(iou, complexity_of(outline, len(partition.faces)), weights)
+        n_triangles = len(partition.faces) - partition.n_quads
+        off = weights.w_sc * _TRIANGLE * n_triangles + self.simulator.off(outline.loops)
+        return QuadPlace(outline, partition, score, score.total - off)
 
     def fit(self, outlines: list[Outline], config: RefitConfig, iou: float) -> list[QuadPlace]:
         """Each outline refitted, on all cores, on the way to more than `iou`."""
@@ -102,8 +103,10 @@ class QuadHill:
             found += quad_neighbours(place.outline, place.partition, silhouette, n_blamed)
         if self.axis is not None:
             found = list(symmetric_neighbours(found, place.outline, self.axis))
-        likely = [found[k] for k in _best_first(map_threads(self.promise, found))[:_N_LIKELY]]
-        return [likely[k] for k in _best_first(map_threads(lambda outline: self.place(outline).total, likely))]
+        ious = [self._iou(outline) for outline in found]
+        likely = _best_first(list(map(self._promise, found, ious)))[:_N_LIKELY]
+        places = map_threads(lambda k: self.place(found[k], ious[k]), likely)
+        return [found[likely[k]] for k in _best_first([place.total for place in places])]
 
     def polished(self, place: QuadPlace) -> list[PolyMesh]:
         """The mesh of a place, polished under the rule and, if asked for, aligned; none if it has defects."""
@@ -127,7 +130,5 @@ def _best_first(worth: Sequence[float]) -> list[int]:
 
 def complexity_of(outline: Outline, n_faces: int) -> int:
     """V + E + F of a mesh of that outline, by Euler's formula: V - E + F is its parts less its holes."""
-    n_vertices = sum(len(ring.points) for ring in outline.rings)
-    n_holes = sum(ring.is_hole for ring in outline.rings)
-    n_parts = len(outline.rings) - n_holes
-    return 2 * (n_vertices + n_faces) - n_parts + n_holes
+    n_parts = len(outline.rings) - outline.n_holes
+    return 2 * (outline.n_vertices + n_faces) - n_parts + outline.n_holes

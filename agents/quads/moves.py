@@ -90,10 +90,10 @@ def _rungs_more(outline: Outline, partition: Partition, silhouette: Silhouette, 
     rim = [(a, b) for a, b in loops.topology.boundary_half_edges.tolist()]
     for row in blamed_rows(disagreement, n_blamed):
         a, b = rim[row]
-        new = _added(outline, grown_at(outline, disagreement, row, "edge_subdivide"))
         across = _other_end_of_strip(opposite, set(rim), (a, b))
         if across is not None:
             c, d = across
+            new = _added(outline, grown_at(outline, disagreement, row, "edge_subdivide"))
             share = _share_along(new, loops.vertices[a], loops.vertices[b])
             yield _with_points(
                 outline, {(a, b): new, (c, d): loops.vertices[d] + share * (loops.vertices[c] - loops.vertices[d])}

@@ -6,6 +6,7 @@ bridge, which becomes an edge of the mesh; which bridges are best is searched fr
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -33,7 +34,7 @@ class Partition:
     faces: tuple[Face, ...]
     cost: float  # elements that the faces add to the rings, with a little for ugly corners
 
-    @property
+    @cached_property
     def n_quads(self) -> int:
         return sum(len(face) == 4 for face in self.faces)
 
@@ -58,13 +59,13 @@ def partitioned(outline: Outline, bend: float = 0.0) -> Partition | None:
 
 def least_faces(outline: Outline) -> int:
     """How many faces there are at least: all of them quads, but one where the number of corners is odd."""
-    n_faces = 0
-    for k, ring in enumerate(outline.rings):
-        if not ring.is_hole:
-            holes = [other for other in outline.rings if other.parent == k]
-            n = len(ring.points) + sum(len(hole.points) for hole in holes)
-            n_faces += (n + 2 * len(holes) - 1) // 2
-    return n_faces
+    if len(outline.rings) == 1:
+        return (outline.n_vertices - 1) // 2
+    n_corners = {k: len(ring.points) for k, ring in enumerate(outline.rings) if not ring.is_hole}
+    for ring in outline.rings:
+        if ring.is_hole:
+            n_corners[ring.parent] += len(ring.points) + 2  # the bridge to it is walked both ways
+    return sum((n - 1) // 2 for n in n_corners.values())
 
 
 def bent(mesh: PolyMesh, bonds: Bonds | None = None) -> PolyMesh | None:

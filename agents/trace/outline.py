@@ -31,17 +31,23 @@ class Outline:
         points = np.concatenate([ring.points for ring in self.rings])
         return PolyMesh(points, cycles, tuple(range(n)), tuple(range(f)), n, f)
 
+    @cached_property
+    def n_vertices(self) -> int:
+        return sum(len(ring.points) for ring in self.rings)
+
+    @cached_property
+    def n_holes(self) -> int:
+        return sum(ring.is_hole for ring in self.rings)
+
     @property
     def is_fine(self) -> bool:
         """Whether it has so many vertices that moves of single ones are not tried."""
-        return len(self.loops.vertices) > MANY_VERTICES
+        return self.n_vertices > MANY_VERTICES
 
     @property
     def complexity(self) -> int:
         """V + E + F of the mesh that has these rings: each hole brings two bridges and a face."""
-        n_vertices = sum(len(ring.points) for ring in self.rings)
-        n_holes = sum(ring.is_hole for ring in self.rings)
-        return 2 * n_vertices + 3 * n_holes + (len(self.rings) - n_holes)
+        return 2 * self.n_vertices + 3 * self.n_holes + (len(self.rings) - self.n_holes)
 
     @property
     def n_steps(self) -> int:
@@ -55,10 +61,13 @@ class Outline:
 
     def score(self, target: Target, weights: ScoreWeights) -> Score:
         """The score of the mesh that has these rings, its bridges crossing nothing."""
-        iou = intersection_over_union(self.loops, target)
+        return self.scored(intersection_over_union(self.loops, target), self.complexity, weights)
+
+    def scored(self, iou: float, complexity: int, weights: ScoreWeights) -> Score:
+        """The score of a mesh that has these rings and this IoU, its inner edges crossing nothing."""
         crossings = self_intersections(self.loops)
-        total = weights.w_sm * iou - weights.w_sc * self.complexity - weights.w_si * crossings
-        return Score(iou, self.complexity, crossings, total)
+        total = weights.w_sm * iou - weights.w_sc * complexity - weights.w_si * crossings
+        return Score(iou, complexity, crossings, total)
 
     def refitted(self, target: RefitTarget, config: RefitConfig, bonds: Bonds | None = None) -> "Outline":
         """The rings moved to match the target, as far as bonds of `loops` let them."""

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
+from itertools import islice
 from typing import Any, SupportsFloat, SupportsIndex
 
 import numpy as np
@@ -138,10 +139,13 @@ class Operator:
         """Whether it changes what is rendered. Raises ConformanceError."""
         return bool(self._own(self.shows, mesh, element))
 
-    def starts(self, evidence: Evidence, element: int) -> list[Start]:
-        """The meshes from which to refit after it has worked on `element`, one or more. Raises as `apply`."""
+    def starts(self, evidence: Evidence, element: int, n_most: int | None = None) -> list[Start]:
+        """The meshes from which to refit after it has worked on `element`, one or more, the first `n_most` at most.
+
+        Raises as `apply`.
+        """
         if self.begin is not None:
-            found = self._started(self.begin, evidence, element)
+            found = self._started(self.begin, evidence, element, n_most=n_most)
             if not found:
                 raise self._broken("it begins nowhere; expected one Start or more")
             return found
@@ -175,9 +179,11 @@ class Operator:
                 return _found_at, (self.module, name)
         return super().__reduce_ex__(protocol)
 
-    def _started(self, begin: Callable[..., Iterator[Start]], *arguments: Any) -> list[Start]:
+    def _started(
+        self, begin: Callable[..., Iterator[Start]], *arguments: Any, n_most: int | None = None
+    ) -> list[Start]:
         """The starts that one of the operator's functions gives, one after the other."""
-        found: list[Start] = self._own(lambda: list(begin(*arguments)))
+        found: list[Start] = self._own(lambda: list(islice(begin(*arguments), n_most)))
         odd = [one for one in found if not (isinstance(one, Start) and isinstance(one.mesh, PolyMesh))]
         if odd:
             raise self._broken(f"it begins at {odd[0]!r:.40}; expected a Start with a PolyMesh")
