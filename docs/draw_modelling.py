@@ -60,7 +60,7 @@ def construction(name: str) -> ByteArray:
     """Every mesh of the modeller's construction of a picture."""
     target = load_silhouette(ROOT / "examples" / f"{name}.png")
     sequence = solved("modeller", target).sequence
-    captions = ["begin with\nthe largest face", *(step.operator.replace("_", " ") + "\n" for step in sequence.steps)]
+    captions = ["begin with\nthe body", *(step.operator.replace("_", " ") + "\n" for step in sequence.steps)]
     frames = [frame(mesh, target, caption) for mesh, caption in zip(sequence.meshes(), captions, strict=True)]
     frames += [np.full_like(frames[0], 255)] * (-len(frames) % COLUMNS)
     return np.vstack([np.hstack(frames[k : k + COLUMNS]) for k in range(0, len(frames), COLUMNS)])

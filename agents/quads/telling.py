@@ -1,8 +1,9 @@
 """In which order a mesh of quads and triangles is modelled, and with which operators.
 
-It begins with the largest face. Every further face hangs on an edge that is there already: a new quad is an extrusion,
-a new triangle a cap; a face whose corners are all there closes a ring and is filled in. Branches are followed to their
-end before the next one begins, and rings are closed last, so that whoever follows never goes back.
+It begins with the main body: a face that is large, and of whose branches none is much larger. Every further face
+hangs on an edge that is there already: a new quad is an extrusion, a new triangle a cap; a face whose corners are all
+there closes a ring and is filled in. Branches are followed to their end before the next one begins, and rings are
+closed last, so that whoever follows never goes back.
 """
 
 from collections.abc import Iterator
@@ -27,20 +28,51 @@ class Addition:
 def order_of(mesh: PolyMesh, rank: int = 0, deep: bool = True) -> Iterator[Addition]:
     """The faces of a mesh in the order in which they are modelled; each part of the mesh after the other.
 
-    It begins with the face that is largest but `rank`. Unless `deep`, all branches grow at once.
+    It begins with the best body but `rank`. Unless `deep`, all branches grow at once.
     """
     areas = mesh.face_areas()
     waiting = set(range(len(mesh.faces)))
     n_parts = 0
     while waiting:
-        quads = [f for f in waiting if len(mesh.faces[f]) == 4]
-        starts = sorted(quads or waiting, key=lambda f: (-areas[f], f))
+        starts = _bodies(mesh, areas, waiting)
         start = starts[min(rank, len(starts) - 1)]
         yield Addition(mesh.faces[start], "start" if len(waiting) == len(mesh.faces) else "apart", n_parts)
         for addition in _outwards(mesh, start, areas, waiting, n_parts, deep):
             n_parts = max(n_parts, addition.part)
             yield addition
         n_parts += 1
+
+
+def _bodies(mesh: PolyMesh, areas: FloatArray, waiting: set[int]) -> list[int]:
+    """The faces of the largest part that waits, the best body first: quads, if there are any."""
+    beside: dict[int, set[int]] = {f: set() for f in range(len(mesh.faces))}
+    for f, g in mesh.topology.edge_faces.tolist():
+        if g >= 0:
+            beside[f].add(g)
+            beside[g].add(f)
+    part = max(_hanging_together(waiting, beside), key=lambda faces: (sum(areas[f] for f in faces), -min(faces)))
+
+    def heaviest_branch(f: int) -> float:
+        branches = _hanging_together(part - {f}, beside)
+        return float(max((sum(areas[g] for g in faces) for faces in branches), default=0.0))
+
+    quads = [f for f in part if len(mesh.faces[f]) == 4]
+    excess = {f: heaviest_branch(f) - areas[f] for f in quads or part}
+    return sorted(excess, key=lambda f: (excess[f], f))
+
+
+def _hanging_together(faces: set[int], beside: dict[int, set[int]]) -> list[set[int]]:
+    """The faces in sets, each of which hangs together by edges."""
+    left, parts = set(faces), []
+    while left:
+        part: set[int] = set()
+        fresh = {left.pop()}
+        while fresh:
+            part |= fresh
+            fresh = {g for f in fresh for g in beside[f]} & left
+            left -= fresh
+        parts.append(part)
+    return parts
 
 
 def _outwards(

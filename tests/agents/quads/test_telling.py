@@ -53,6 +53,18 @@ def test_row_of_quads__is_extruded_from_its_largest() -> None:
     assert assert_built(mesh) == ["edge_extrude", "edge_extrude"]
 
 
+def test_body__is_where_the_limbs_meet_unless_a_limb_is_much_larger() -> None:
+    def cross(reach: float) -> PolyMesh:
+        """A small square with arms to the left and right, and one upwards of that length."""
+        points = [(0.45, 0.6), (0.55, 0.6), (0.55, 0.7), (0.45, 0.7), (0.2, 0.6), (0.2, 0.7), (0.8, 0.6), (0.8, 0.7)]
+        points += [(0.45, 0.6 - reach), (0.55, 0.6 - reach)]
+        return PolyMesh.from_faces(points, [(0, 1, 2, 3), (4, 0, 3, 5), (1, 6, 7, 2), (8, 9, 1, 0)])
+
+    assert next(order_of(cross(0.26))).face == (0, 1, 2, 3)
+    assert [addition.part for addition in order_of(cross(0.26))] == [0, 1, 2, 3]
+    assert next(order_of(cross(0.59))).face == (8, 9, 1, 0)
+
+
 def test_ring__is_closed_by_a_fill() -> None:
     mesh = cut(Ring(BOX, -1), hole(small(BOX, 0.5, 0.5, 0.5)))
     assert kinds(mesh) == {"start": 1, "extrude": 2, "fill": 1}
