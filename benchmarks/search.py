@@ -16,6 +16,7 @@ from rich.status import Status
 from agents.commands.running import run_command
 from autopoly_env.errors import ConfigError, SilhouetteError
 from autopoly_env.files import write_atomically
+from autopoly_env.mesh import face_rule
 from autopoly_env.silhouette import find_images
 from benchmarks import report, search_rows
 from benchmarks.curves import need_matplotlib
@@ -103,14 +104,16 @@ def gap(
     limit: Annotated[int, typer.Option(min=1, help="How many shapes.")] = 100,
     refits: Refits = 400,
     width: Annotated[int, typer.Option(min=1, help="Of the oracle's beam.")] = 64,
+    faces: Annotated[str, typer.Option(help="Rule of faces: any, convex or quads.")] = "any",
     workers: Workers = 1,
     records: Kept = _RECORDS,
     fresh: Fresh = False,
 ) -> None:
-    """How far mcts stays below a very wide beam on shapes of the construction simulator, w_sc 1."""
+    """How far mcts (under a rule of faces quads) stays below a very wide beam on constructions, w_sc 1."""
+    face_rule(faces)
     bench = _Bench(records, workers, fresh)
     oracle = bench.completer("oracle", keep=True)
-    rows = search_rows.gap_rows(bench.completer("gap"), oracle, limit, refits, width)
+    rows = search_rows.gap_rows(bench.completer("gap"), oracle, limit, refits, width, faces)
     bench.show("gap to the oracle, constructions of difficulty 1 to 5, w_sc 1", rows)
 
 

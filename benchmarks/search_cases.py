@@ -14,6 +14,7 @@ from agents.registry import make_agent
 from agents.solution import Solution
 from autopoly_env.errors import OutputError
 from autopoly_env.files import write_atomically
+from autopoly_env.mesh import face_rule
 from autopoly_env.score import ScoreWeights
 from autopoly_env.silhouette import Silhouette, load_silhouette
 from autopoly_env.simulator import Simulator
@@ -35,6 +36,7 @@ class Case:
     options: str = "{}"  # of the agent, as JSON
     refits: int | None = None
     seconds: float | None = None
+    faces: str = "any"  # the rule of faces; under one the operators are the modeller's
 
     @property
     def name(self) -> str:
@@ -77,9 +79,14 @@ def target_of(name: str) -> Silhouette:
 
 
 def simulator_of(case: Case) -> Simulator:
-    """The rules of every case: preset `full` at 128 x 128."""
-    weights = ScoreWeights(w_sc=case.w_sc)
-    return Simulator(target_of(case.target), operators="full", resolution=RESOLUTION, weights=weights)
+    """The rules of a case: preset `full`, or `modeller` under a rule of faces, at 128 x 128."""
+    return Simulator(
+        target_of(case.target),
+        operators="full" if case.faces == "any" else "modeller",
+        resolution=RESOLUTION,
+        weights=ScoreWeights(w_sc=case.w_sc),
+        faces=face_rule(case.faces),
+    )
 
 
 def measure(case: Case) -> Found:

@@ -66,10 +66,13 @@ OnDone = Callable[[Case, str], None]  # told of each case that is over, and what
 Totals = dict[tuple[str, float, int], Interval]  # (agent, w_sc, refits) -> mean r_all
 
 
-def gap_rows(complete: Complete, oracle: Complete, limit: int, refits: int, width: int) -> Iterator[Row]:
-    """How far `mcts` stays below the oracle on constructions, w_sc 1."""
-    best = [with_options(Case(target, "oracle", 1.0), width=width) for target in made("construction", limit)]
-    ours = [Case(target, "mcts", 1.0, refits=refits) for target in made("construction", limit)]
+def gap_rows(
+    complete: Complete, oracle: Complete, limit: int, refits: int, width: int, faces: str = "any"
+) -> Iterator[Row]:
+    """How far `mcts`, under a rule of faces `quads`, stays below the oracle on constructions, w_sc 1."""
+    agent, targets = "mcts" if faces == "any" else "quads", made("construction", limit)
+    best = [with_options(Case(target, "oracle", 1.0, faces=faces), width=width) for target in targets]
+    ours = [Case(target, agent, 1.0, refits=refits, faces=faces) for target in targets]
     reached, found = _totals(best, oracle(best)), _totals(ours, complete(ours))
     both = [target for target in found if target in reached]
     if not both:
@@ -78,7 +81,7 @@ def gap_rows(complete: Complete, oracle: Complete, limit: int, refits: int, widt
     gaps = np.array([reached[target] - found[target] for target in both])
     mean = bootstrap_mean(gaps)
     first, second = (_mean(totals[target] for target in both) for totals in (found, reached))
-    yield Row(f"mcts, {refits} refits: mean r_all", first, second, note=f"against the oracle of width {width}")
+    yield Row(f"{agent}, {refits} refits: mean r_all", first, second, note=f"against the oracle of width {width}")
     yield Row("mean gap to the oracle", mean.mean, note=_interval(mean, len(both)))
     worst = both[int(gaps.argmax())]
     yield Row("largest gap", float(gaps.max()), note=worst)
