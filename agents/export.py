@@ -35,6 +35,7 @@ Examples:
   python -m agents.export out/chair/sequence.json --to svg --step 4
   python -m agents.export out/*/sequence.json --to gltf --depth 0.1 --out glTF
   python -m agents.export out/key/sequence.json --to stl --depth 0.05 --size 80
+  python -m agents.export out/vase/sequence.json --to blender --half
 
 \b
 Formats:
@@ -93,6 +94,12 @@ def export(
         Path | None,
         typer.Option(metavar="IMAGE", help="The picture on the mesh (obj, gltf).", show_default="none"),
     ] = None,
+    half: Annotated[
+        bool,
+        typer.Option(
+            "--half", help="What lies to the right of a symmetric mesh's axis, for a mirror (obj, gltf, blender)."
+        ),
+    ] = False,
     operators: OutsideOperators = None,
     object_: pictures.Object = "auto",
     background: pictures.Background = None,
@@ -114,7 +121,7 @@ def export(
         raise ConfigError("--object, --show-mask and the like are about the picture of --target; give one")
     made = _choose(to, out, len(sources))
     _refuse_what_is_not_shown(
-        made, depth=depth, target=target, size=size, triangles=triangles, layers=layers, texture=texture
+        made, depth=depth, target=target, size=size, triangles=triangles, layers=layers, texture=texture, half=half
     )
     jobs = list(_name_outputs(sources, out, made.suffix))
     silhouette = load_silhouette(target, options=picture) if target else None
@@ -124,7 +131,7 @@ def export(
     n_failed = 0
     for source, goal in jobs:
         try:
-            _write(made, Export(_load(source, step), silhouette, depth, size, triangles, layers, shown), goal)
+            _write(made, Export(_load(source, step), silhouette, depth, size, triangles, layers, shown, half), goal)
             print(tame(str(goal)))
         except ConfigError:
             raise

@@ -171,6 +171,8 @@ def _sample_exports(made: Format) -> Iterator[Export]:
     switches = {"triangles", "layers"}.intersection(made.options)
     if switches:
         yield Export(sequence, triangles="triangles" in switches, layers="layers" in switches)
+    if "half" in made.options:
+        yield Export(sequence.trim(0), half=True)
 
 
 def _written(made: Format, export: Export, path: Path, where: str) -> None:

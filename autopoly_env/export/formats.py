@@ -29,6 +29,7 @@ class Export:
     triangles: bool = False  # no other faces
     layers: bool = False  # all steps, each in a layer, where otherwise the last mesh is shown
     texture: "Texture | None" = None  # the picture on the mesh
+    half: bool = False  # of the mesh what lies to the right of its axis, for a mirror to make whole
 
 
 @dataclass(frozen=True)

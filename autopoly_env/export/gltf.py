@@ -4,6 +4,7 @@ import base64
 import json
 import os
 import struct
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy.typing as npt
 from autopoly_env.arrays import FloatArray, IntArray
 from autopoly_env.errors import ConfigError
 from autopoly_env.export.formats import Format, register_format
+from autopoly_env.export.half import check_flat, halved
 from autopoly_env.export.replay import finite_meshes, sequence_name, unmoved
 from autopoly_env.export.solid import Solid, to_solid, to_triangles
 from autopoly_env.export.texture import Texture
@@ -33,6 +35,8 @@ def save_gltf(
     path: str | os.PathLike[str],
     depth: float = 0.0,
     texture: Texture | None = None,
+    *,
+    half: bool = False,
 ) -> Path:
     """Write a sequence as glTF: text with all data in it for the suffix .gltf, binary for .glb.
 
@@ -41,15 +45,20 @@ def save_gltf(
     scale 0 or 1; the vertices' moves are a morph target. At rest the last step shows and the others have scale 0,
     in the middle of the last mesh, which all places are relative to: so the box of the scene is that mesh's own. As
     viewers count morph targets in as well, the last mesh is there once more without, as `N done`, where it has one. A
-    `texture` is part of the file.
+    `texture` is part of the file. Of a `half` the last mesh's alone is written, its node on the axis.
 
-    Raises ConfigError for another suffix or a depth below 0 or not finite, SequenceError naming a step that cannot be
-    replayed, OutputError if the file cannot be written.
+    Raises ConfigError for another suffix, a depth below 0 or not finite or a half with depth, SequenceError naming a
+    step that cannot be replayed, OutputError if the file cannot be written or the mesh has no half.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:
         raise ConfigError(f"{path}: expected a file name that ends in .gltf (text) or .glb (binary)")
-    document, data = _document(sequence, depth, texture)
+    axis = None
+    if half:
+        check_flat(depth)
+        mesh, axis = halved(finite_meshes(sequence)[-1])
+        sequence = replace(sequence, start=mesh, steps=())
+    document, data = _document(sequence, depth, texture, axis)
     if suffix == ".glb":
         return write_atomically(path, _binary(document, data))
     document["buffers"][0]["uri"] = "data:application/octet-stream;base64," + base64.b64encode(data).decode("ascii")
@@ -90,10 +99,13 @@ class _Buffer:
         return len(self.accessors) - 1
 
 
-def _document(sequence: ConstructionSequence, depth: float, texture: Texture | None) -> tuple[dict[str, Any], bytes]:
+def _document(
+    sequence: ConstructionSequence, depth: float, texture: Texture | None, axis: float | None
+) -> tuple[dict[str, Any], bytes]:
+    """The text and the data. Nodes stand in the middle of the last mesh, or on the axis where there is one."""
     meshes = finite_meshes(sequence)
     buffer, end = _Buffer(), STEP_SECONDS * len(meshes)
-    middle = _middle(to_solid(meshes[-1], depth))
+    middle = _middle(to_solid(meshes[-1], depth), axis)
     times = [(STEP_SECONDS * number, STEP_SECONDS * (number + 1)) for number in range(len(meshes))]
     shapes: list[dict[str, Any]] = []
     nodes: list[dict[str, Any]] = []
@@ -152,9 +164,11 @@ def _textured(buffer: _Buffer, texture: Texture) -> dict[str, Any]:
     return maps | _look({"baseColorTexture": {"index": 0}})
 
 
-def _middle(solid: Solid) -> FloatArray:
-    """(3,) the middle of its box, in numbers that single precision has."""
+def _middle(solid: Solid, axis: float | None) -> FloatArray:
+    """(3,) the middle of its box, x that of the axis if there is one, in numbers that single precision has."""
     middle = 0.5 * (solid.vertices.min(axis=0) + solid.vertices.max(axis=0))
+    if axis is not None:
+        middle[0] = axis
     return middle.astype(np.float32).astype(np.float64)
 
 
@@ -208,8 +222,8 @@ register_format(
         "gltf",
         SUFFIXES,
         "an animation for viewers and engines; binary in a file .glb",
-        lambda export, path: save_gltf(export.sequence, path, export.depth, export.texture),
+        lambda export, path: save_gltf(export.sequence, path, export.depth, export.texture, half=export.half),
         shows_depth=True,
-        options=("texture",),
+        options=("texture", "half"),
     )
 )

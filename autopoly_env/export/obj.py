@@ -5,6 +5,7 @@ from pathlib import Path
 
 from autopoly_env.errors import MeshError
 from autopoly_env.export.formats import Export, Format, register_format
+from autopoly_env.export.half import check_flat, halved
 from autopoly_env.export.solid import face_lines, solid_lines, to_solid_obj
 from autopoly_env.export.texture import Texture
 from autopoly_env.export.triangles import is_concave, triangulate
@@ -15,12 +16,13 @@ MOST_BYTES = 16_000_000  # of a file
 WAY_OUT = "agents.export --to obj --triangles cuts them"
 
 
-def to_obj(mesh: PolyMesh, *, triangles: bool = False) -> str:
+def to_obj(mesh: PolyMesh, *, triangles: bool = False, half: bool = False) -> str:
     """The mesh as OBJ text: in the unit square at z = 0 with y up, floats with all their digits.
 
     Faces keep their n corners and their first one, or are cut into triangles. They run the other way round than in
     `mesh`, because turning y up mirrors the picture: a face of positive area has positive area there too, and looks
     towards +z. Where n-gons are concave a line at the top says so: many readers take them for larger than they are.
+    Of a `half` the axis is x = 0, where programs mirror. Raises OutputError for the half of a mesh that has none.
 
     >>> print(to_obj(PolyMesh.rectangle(0.0, 0.0, 1.0, 0.5)), end="")
     # AutoPoly: 4 vertices, 4 edges, 1 face; unit square, y up
@@ -30,12 +32,17 @@ def to_obj(mesh: PolyMesh, *, triangles: bool = False) -> str:
     v 0.0 0.5 0
     f 1 4 3 2
     """
-    head, vertices, faces = _flat_lines(mesh, triangles)
+    head, vertices, faces = _flat_lines(*_part(mesh, half), triangles)
     return "\n".join([*head, *vertices, *face_lines(faces)]) + "\n"
 
 
-def _flat_lines(mesh: PolyMesh, triangles: bool) -> tuple[list[str], list[str], list[Face]]:
-    """Comments, `v` lines and faces of a flat mesh, y up."""
+def _part(mesh: PolyMesh, half: bool) -> tuple[PolyMesh, float | None]:
+    """The mesh, or the half of it and the axis."""
+    return halved(mesh) if half else (mesh, None)
+
+
+def _flat_lines(mesh: PolyMesh, axis: float | None, triangles: bool) -> tuple[list[str], list[str], list[Face]]:
+    """Comments, `v` lines and faces of a flat mesh, y up; of a half with its axis at x = 0."""
     n_vertices, n_edges, n_faces = mesh.counts
     told = f"{n_faces} face" + ("s" if n_faces != 1 else "")
     head = [f"# AutoPoly: {n_vertices} vertices, {n_edges} edges, {told}; unit square, y up"]
@@ -47,12 +54,20 @@ def _flat_lines(mesh: PolyMesh, triangles: bool) -> tuple[list[str], list[str], 
         head.append(f"# cut into {len(faces)} triangles")
     elif n_concave := sum(map(is_concave, rings)):
         head.append(f"# {n_concave} of them concave, which some readers fan from a corner: {WAY_OUT}")
-    vertices = [f"v {x!r} {(1.0 - y)!r} 0" for x, y in points]
+    if axis is not None:
+        head.append(f"# half of a mesh, cut at x = {axis!r}, which is x = 0 here: a mirror makes it whole")
+    vertices = [f"v {x - (axis or 0.0)!r} {(1.0 - y)!r} 0" for x, y in points]
     return head, vertices, [(first, *reversed(others)) for first, *others in faces]
 
 
 def save_textured_obj(
-    mesh: PolyMesh, path: str | os.PathLike[str], texture: Texture, depth: float = 0.0, *, triangles: bool = False
+    mesh: PolyMesh,
+    path: str | os.PathLike[str],
+    texture: Texture,
+    depth: float = 0.0,
+    *,
+    triangles: bool = False,
+    half: bool = False,
 ) -> Path:
     """Write the mesh, or its solid, as OBJ with the picture on it: beside it NAME.mtl and NAME.texture.png.
 
@@ -65,7 +80,8 @@ def save_textured_obj(
         head, vertices, faces, sources = solid_lines(mesh, depth, triangles)
         places = texture.places(mesh.vertices)[list(sources)]
     else:
-        head, vertices, faces = _flat_lines(mesh, triangles)
+        mesh, axis = _part(mesh, half)
+        head, vertices, faces = _flat_lines(mesh, axis, triangles)
         places = texture.places(mesh.vertices)
     uses = [f"mtllib {material.name}", "usemtl picture"]
     mapped = [f"vt {u!r} {(1.0 - v)!r}" for u, v in places.tolist()]
@@ -128,10 +144,12 @@ def _vertex(corner: str, n_vertices: int) -> int:
 
 
 def _write(export: Export, path: Path) -> Path:
-    mesh, depth, triangles = export.sequence.final(), export.depth, export.triangles
+    mesh, depth, triangles, half = export.sequence.final(), export.depth, export.triangles, export.half
+    if half:
+        check_flat(depth)
     if export.texture:
-        return save_textured_obj(mesh, path, export.texture, depth, triangles=triangles)
-    text = to_solid_obj(mesh, depth, triangles=triangles) if depth else to_obj(mesh, triangles=triangles)
+        return save_textured_obj(mesh, path, export.texture, depth, triangles=triangles, half=half)
+    text = to_solid_obj(mesh, depth, triangles=triangles) if depth else to_obj(mesh, triangles=triangles, half=half)
     return write_atomically(path, text)
 
 
@@ -142,6 +160,6 @@ register_format(
         "the last mesh, with its n-gons; a solid with --depth",
         _write,
         shows_depth=True,
-        options=("triangles", "texture"),
+        options=("triangles", "texture", "half"),
     )
 )

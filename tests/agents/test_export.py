@@ -198,6 +198,25 @@ def test_texture__is_put_on_obj_and_gltf(run: Run) -> None:
     assert (done.code, done.out, len(done.err.splitlines())) == (1, "", 1) and "none.png" in done.err
 
 
+@pytest.mark.parametrize(
+    ("name", "said"), [("obj", "which is x = 0 here"), ("gltf", '"0 start"'), ("blender", "HALF = 0.5 ")]
+)
+def test_half__reaches_obj_gltf_and_blender(run: Run, name: str, said: str) -> None:
+    saved()
+    done = run("house.json", "--to", name, "--half", "--step", "0", "--out", "half")
+    assert (done.code, done.err) == (0, "")
+    assert said in Path(done.out.strip()).read_text()
+
+
+@pytest.mark.parametrize("name", ["obj", "gltf", "blender"])
+def test_half__of_what_is_not_symmetric_is_one_line_and_exit_code_1(run: Run, name: str) -> None:
+    saved()
+    done = run("house.json", "--to", name, "--half")
+    assert (done.code, done.out, len(done.err.splitlines())) == (1, "", 1)
+    assert re.match(r"error: house.json: the outline is not its own mirror image about x = \S+, the middle: ", done.err)
+    assert os.listdir() == ["house.json"]
+
+
 @pytest.mark.parametrize(("name", "module"), [("dxf", "ezdxf"), ("usd", "pxr.Usd")])
 def test_format_without_its_package__is_one_line(
     run: Run, name: str, module: str, monkeypatch: pytest.MonkeyPatch
@@ -338,6 +357,11 @@ def test_missing_file__does_not_keep_the_others_from_being_written(run: Run) -> 
         (["house.json", "--to", "stl", "--texture", "t.png"], "--texture t.png: stl has nothing of the kind; use it"),
         (["house.json", "--to", "mesh-png", "--out", "a.gif"], "expected a file name that ends in .mesh.png"),
         (["house.json", "--to", "svg", "--triangles"], "--triangles: svg has nothing of the kind; use it with obj"),
+        (
+            ["house.json", "--to", "svg", "--half"],
+            "--half: svg has nothing of the kind; use it with obj",
+        ),
+        (["house.json", "--to", "gltf", "--half", "--depth", "1"], "half with depth 1: halves are flat; mirror it"),
         (["house.json", "--to", "obj", "--layers"], "--layers: obj has nothing of the kind; use it with svg"),
         (["house.json", "--to", "gltf", "--depth", "nan"], "depth nan"),
         (["house.json", "--to", "gltf", "--depth", "-1"], "depth -1.0"),

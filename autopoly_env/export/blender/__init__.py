@@ -19,8 +19,11 @@ register_format(
         "blender",
         (".py",),
         "a Python script that builds the mesh with Blender's own operators",
-        lambda export, path: save_blender_script(export.sequence, path, export.depth, target=export.target),
+        lambda export, path: save_blender_script(
+            export.sequence, path, export.depth, target=export.target, half=export.half
+        ),
         shows_target=True,
         shows_depth=True,
+        options=("half",),
     )
 )

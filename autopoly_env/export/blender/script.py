@@ -5,7 +5,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from autopoly_env.errors import SequenceError
+from autopoly_env.errors import ConfigError, SequenceError
+from autopoly_env.export.half import axis_of, check_flat
 from autopoly_env.export.pictures import picture_url
 from autopoly_env.export.replay import finite_meshes, sequence_name, unmoved
 from autopoly_env.export.solid import check_depth
@@ -31,31 +32,45 @@ def save_blender_script(
     depth: float = 0.0,
     keyframes: bool = False,
     target: Silhouette | None = None,
+    *,
+    half: bool = False,
 ) -> Path:
     """Write `blender_script` to a file, whole or not at all. Raises as it does, and OutputError."""
-    return write_atomically(path, blender_script(sequence, depth=depth, keyframes=keyframes, target=target))
+    return write_atomically(path, blender_script(sequence, depth=depth, keyframes=keyframes, target=target, half=half))
 
 
 def blender_script(
-    sequence: ConstructionSequence, *, depth: float = 0.0, keyframes: bool = False, target: Silhouette | None = None
+    sequence: ConstructionSequence,
+    *,
+    depth: float = 0.0,
+    keyframes: bool = False,
+    target: Silhouette | None = None,
+    half: bool = False,
 ) -> str:
     """The text of a Blender script (ASCII) that makes every step with Blender's operators and checks the counts.
 
     The mesh lies in the XY plane as in `to_obj`, y up. `depth` (units of the unit square) makes it a closed solid
     below z = 0. `keyframes` makes an object for each step, shown one after the other on the time line. A `target` is
-    laid under it as a reference image. Whatever the sequence holds of text is a string there, never code.
-    docs/blender.md tells how to run it.
+    laid under it as a reference image. Of a `half` the last mesh is cut at its axis, where the object's origin is,
+    and has a Mirror modifier. Whatever the sequence holds of text is a string there, never code. docs/blender.md tells
+    how to run it.
 
-    Raises SequenceError naming the step that cannot be replayed; ConfigError for a depth below 0 or not finite.
+    Raises SequenceError naming the step that cannot be replayed; ConfigError for a depth below 0 or not finite, or for
+    a half with depth or keyframes; OutputError for the half of a mesh that has none.
     """
     check_depth(depth)
     meshes = finite_meshes(sequence)
+    if half:
+        check_flat(depth)
+        if keyframes:
+            raise ConfigError("half with keyframes: meshes on the way have no axis; leave one of them out")
     head, _, rest = TEMPLATE.read_text(encoding="utf-8").partition(BEGIN)
     _, _, tail = rest.partition(END)
     constants = [
         f"NAME = {sequence_name(sequence)!a}",
         f"DEPTH = {float(depth)!r}  # thickness, in units of the unit square; 0 is flat",
         f"KEYFRAMES = {bool(keyframes)}  # an object for every step, shown one after the other",
+        f"HALF = {axis_of(meshes[-1]) if half else None}  # x at which it is cut, for a Mirror modifier; None: whole",
         f"PICTURE = {_picture(target)!r}  # what is built, a PNG in base64, laid under the mesh",
     ]
     own = _own_code(sequence)

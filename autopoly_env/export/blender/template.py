@@ -28,6 +28,7 @@ import bmesh
 NAME = "a house"
 DEPTH = 0.0  # thickness, in units of the unit square; 0 is flat
 KEYFRAMES = False  # an object for every step, shown one after the other
+HALF: float | None = None  # x at which the mesh is cut, for a Mirror modifier; None: whole
 PICTURE = ""  # what is built, a PNG in base64, laid under the mesh
 
 
@@ -52,6 +53,7 @@ def build() -> None:
 FRAMES_PER_STEP = 24
 FRAMES_PER_MOVE = 16  # of these
 COLOUR, LINE_COLOUR = (0.32, 0.47, 0.76), (0.013, 0.018, 0.03)  # linear RGB
+MERGE_DISTANCE = 1e-5  # units; what is nearer to the axis of a half lies on it
 LINE_WIDTH, DOT_RADIUS = 0.0056, 0.009  # in rendered pictures, units of the unit square
 
 bm = bmesh.new()
@@ -293,6 +295,8 @@ def add_object(name: str) -> None:
     copy = bm.copy()
     if DEPTH:
         give_depth(copy)
+    if HALF is not None:
+        cut_at_axis(copy, HALF)
     copy.normal_update()
     mesh = bpy.data.meshes.new(name)
     copy.to_mesh(mesh)
@@ -305,6 +309,21 @@ def add_object(name: str) -> None:
         for point, v in zip(unmoved.data, copy.verts, strict=True):
             point.co = (*before_move[v[names]], v.co.z)
     copy.free()
+    if HALF is not None:
+        objects[-1].location.x = HALF
+        mirror = objects[-1].modifiers.new("Mirror", "MIRROR")
+        mirror.use_clip, mirror.merge_threshold = True, MERGE_DISTANCE
+
+
+def cut_at_axis(whole: bmesh.types.BMesh, axis: float) -> None:
+    """Leave what lies to the right of x = axis, and put the origin there, about which the modifier mirrors."""
+    everything = [*whole.verts, *whole.edges, *whole.faces]
+    place, across = (axis, 0.0, 0.0), (1.0, 0.0, 0.0)
+    bmesh.ops.bisect_plane(
+        whole, geom=everything, dist=MERGE_DISTANCE, plane_co=place, plane_no=across, clear_inner=True
+    )
+    for v in whole.verts:
+        v.co.x = 0.0 if abs(v.co.x - axis) <= MERGE_DISTANCE else v.co.x - axis
 
 
 def give_depth(flat: bmesh.types.BMesh) -> None:
@@ -419,7 +438,9 @@ def render(collection: bpy.types.Collection, frame: int, asked: argparse.Namespa
     shot.collection.children.link(collection)
     objects[-1].data.materials[0] = material("AutoPoly fill", COLOUR, glows=True)
     if asked.edges:
-        shot.collection.objects.link(bpy.data.objects.new("edges", drawn_edges(objects[-1].data)))
+        lines = bpy.data.objects.new("edges", drawn_edges(objects[-1].data))
+        lines.location = objects[-1].location
+        shot.collection.objects.link(lines)
     shot.camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     shot.collection.objects.link(shot.camera)
     shot.camera.location = (0.5, 0.5, 10.0)
@@ -469,6 +490,8 @@ def options() -> argparse.Namespace:
     asked = parser.parse_args(given) if bpy.app.background else parser.parse_known_args(given)[0]
     if not 0.0 <= asked.depth < float("inf"):
         parser.error(f"--depth {asked.depth}: expected 0 (flat) or more, in units of the unit square")
+    if HALF is not None and (asked.depth or asked.keyframes):
+        parser.error("--depth and --keyframes: this is half a mesh; write the script without --half for them")
     return asked
 
 

@@ -25,13 +25,16 @@ from autopoly_env.errors import ConfigError, OutputError, SequenceError
 from autopoly_env.export.blender import Job, find_blender, mismatches, run_in_blender
 from autopoly_env.export.blender.script import END, TEMPLATE, blender_script, save_blender_script
 from autopoly_env.export.gltf import save_gltf
+from autopoly_env.export.obj import to_obj
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import OPERATORS
 from autopoly_env.raster import coverage
 from autopoly_env.sequence import ConstructionSequence
 from benchmarks import replay_in_blender
 from tests.helpers.drawings import HOUSE, painted
-from tests.helpers.sequences import gabled, played, walked
+from tests.helpers.sequences import SCORE, gabled, played, walked
+from tests.helpers.shapes import polygon
+from tests.helpers.vases import cut_anyhow, vase
 
 try:
     BLENDER, WHY_NOT = find_blender(), ""
@@ -262,6 +265,33 @@ with open(answer, "w") as stream:
 """
 
 
+MIRRORED = """
+import bpy, json, runpy, sys
+file, answer = sys.argv[-2:]
+if file.endswith(".py"):
+    sys.argv = ["blender"]
+    runpy.run_path(file, run_name="__main__")
+elif file.endswith(".obj"):
+    bpy.ops.wm.obj_import(filepath=file, forward_axis="Y", up_axis="Z")
+else:
+    bpy.ops.import_scene.gltf(filepath=file, import_shading="FLAT")
+(half,) = (o for o in bpy.data.objects if o.type == "MESH")
+if not half.modifiers:
+    half.modifiers.new("Mirror", "MIRROR")  # as it comes
+whole = half.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+areas = [sum(p.area for p in mesh.polygons) for mesh in (half.data, whole)]
+xs = [(half.matrix_world @ v.co).x for v in whole.vertices]
+sides = {}
+for p in whole.polygons:
+    for a, b in p.edge_keys:
+        sides[a, b] = sides.get((a, b), 0) + 1
+normals = [p.normal.z if abs(p.normal.z) > 0.5 else -p.normal.y for p in whole.polygons]
+with open(answer, "w") as stream:
+    json.dump([*areas, min(xs), max(xs), list(sides.values()).count(1), max(sides.values()), min(normals)], stream)
+"""
+VASES = {f"vase-{seed}": cut_anyhow(polygon(vase(seed, 2 + seed)), seed, 2 * seed) for seed in range(6)}
+
+
 @dataclass(frozen=True)
 class Made:
     """What Blender made of everything, in a folder by name."""
@@ -301,6 +331,13 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Made:
     save_blender_script(gabled(), folder / "backed.py", target=painted(HOUSE))
     (folder / "reference.py").write_text(REFERENCE, encoding="utf-8")
     jobs["reference"] = Job(folder / "reference.py", (f"{folder / 'backed.py'}", f"{folder / 'reference.json'}"))
+    (folder / "mirrored.py").write_text(MIRRORED, encoding="utf-8")
+    for name, mesh in VASES.items():
+        sequence = ConstructionSequence({}, mesh, SCORE)
+        (folder / f"{name}.obj").write_text(to_obj(mesh, half=True))
+        halves = (save_blender_script(sequence, folder / f"{name}.py", half=True), folder / f"{name}.obj")
+        for file in (*halves, save_gltf(sequence, folder / f"{name}.glb", half=True)):
+            jobs[file.name] = Job(folder / "mirrored.py", (str(file), f"{file}.json"))
     problems = dict(zip(jobs, run_in_blender(list(jobs.values()), seconds=600.0), strict=True))
     return Made(folder, sequences, problems)
 
@@ -374,6 +411,22 @@ def test_solid_from_blender__is_closed_and_has_the_volume_area_times_depth(made:
         volume = np.linalg.det(points[corners]).sum() / 6.0
         assert volume == pytest.approx(0.1 * made.sequences[name].final().face_areas().sum(), abs=1e-5), name
         assert (points[:, 2].min(), points[:, 2].max()) == (-0.1, 0.0)
+
+
+@pytest.mark.slow
+@needs_blender
+@pytest.mark.parametrize("ending", ["py", "obj", "glb"])
+@pytest.mark.parametrize("name", VASES)
+def test_half__is_made_whole_by_blenders_mirror(made: Made, name: str, ending: str) -> None:
+    assert made.problems[f"{name}.{ending}"] == ""
+    answer = json.loads((made.folder / f"{name}.{ending}.json").read_text(encoding="utf-8"))
+    half, whole, low, high, n_rim, most, up = answer
+    mesh = VASES[name]
+    area, middle = float(mesh.face_areas().sum()), 0.0 if ending == "obj" else 0.5
+    assert [half, whole] == pytest.approx([0.5 * area, area], rel=1e-5)
+    assert [low, high] == pytest.approx(np.array((-0.5, 0.5)) * np.ptp(mesh.vertices[:, 0]) + middle, abs=1e-6)
+    assert n_rim == len(mesh.topology.boundary_half_edges) and most == 2  # nothing is left open at the axis
+    assert up > 0.99
 
 
 @pytest.mark.slow
