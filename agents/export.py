@@ -89,7 +89,9 @@ def export(
         ),
     ] = None,
     triangles: Annotated[bool, typer.Option("--triangles", help="Cut faces into triangles (obj).")] = False,
-    layers: Annotated[bool, typer.Option("--layers", help="All steps, a layer each (svg).")] = False,
+    layers: Annotated[
+        bool, typer.Option("--layers", help="All steps (svg), or inner edges (dxf), on layers of their own.")
+    ] = False,
     texture: Annotated[
         Path | None,
         typer.Option(metavar="IMAGE", help="The picture on the mesh (obj, gltf).", show_default="none"),

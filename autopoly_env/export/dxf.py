@@ -12,17 +12,17 @@ from autopoly_env.files import write_atomically
 from autopoly_env.mesh import PolyMesh
 
 LAYER = "CUT"
-FOLDS = "EDGES"  # what lies inside, on a layer that is off
+FOLDS = "EDGES"  # what lies inside, on a layer that is off, which some programs draw and cut all the same
 VERSION = "R2010"
 RED, GREY = 1, 8  # of the AutoCAD colour index
 
 
-def to_dxf(mesh: PolyMesh, size: float = MILLIMETRES) -> str:
+def to_dxf(mesh: PolyMesh, size: float = MILLIMETRES, *, layers: bool = False) -> str:
     """The drawing as text, the unit square `size` millimetres wide, y up.
 
     Each loop of the boundary is a closed LWPOLYLINE on the layer `CUT`, counter-clockwise around material, clockwise
-    around holes; edges between faces are LINEs on the layer `EDGES`, which is off. Raises ConfigError without ezdxf and
-    for a size that is none.
+    around holes. With `layers` the edges between faces are LINEs on the layer `EDGES`, which is off. Raises ConfigError
+    without ezdxf and for a size that is none.
     """
     side, ezdxf = check_size(size), need("ezdxf", "ezdxf", "dxf")
     places = (side * (mesh.vertices * (1, -1) + (0, 1))).tolist()
@@ -30,7 +30,9 @@ def to_dxf(mesh: PolyMesh, size: float = MILLIMETRES) -> str:
     ezdxf.options.write_fixed_meta_data_for_testing = True  # no dates: the same mesh gives the same bytes
     try:
         drawing = ezdxf.new(VERSION, units=ezdxf.units.MM)
-        _draw(drawing, mesh, places)
+        _draw_outlines(drawing, mesh, places)
+        if layers:
+            _draw_folds(drawing, mesh, places)
         stream = io.StringIO()
         drawing.write(stream)
     finally:
@@ -38,12 +40,16 @@ def to_dxf(mesh: PolyMesh, size: float = MILLIMETRES) -> str:
     return stream.getvalue()
 
 
-def _draw(drawing: Any, mesh: PolyMesh, places: list[list[float]]) -> None:
+def _draw_outlines(drawing: Any, mesh: PolyMesh, places: list[list[float]]) -> None:
     drawing.layers.add(LAYER, color=RED)
-    drawing.layers.add(FOLDS, color=GREY).off()
     space = drawing.modelspace()
     for loop in mesh.topology.boundary_loops:
         space.add_lwpolyline([places[v] for v in loop[::-1]], close=True, dxfattribs={"layer": LAYER})
+
+
+def _draw_folds(drawing: Any, mesh: PolyMesh, places: list[list[float]]) -> None:
+    drawing.layers.add(FOLDS, color=GREY).off()
+    space = drawing.modelspace()
     for (a, b), is_rim in zip(mesh.edges.tolist(), mesh.topology.is_boundary_edge, strict=True):
         if not is_rim:
             space.add_line(places[a], places[b], dxfattribs={"layer": FOLDS})
@@ -51,9 +57,10 @@ def _draw(drawing: Any, mesh: PolyMesh, places: list[list[float]]) -> None:
 
 def _write(export: Export, path: Path) -> Path:
     mesh = finite_meshes(export.sequence)[-1]
-    return write_atomically(path, to_dxf(mesh, MILLIMETRES if export.size is None else export.size))
+    size = MILLIMETRES if export.size is None else export.size
+    return write_atomically(path, to_dxf(mesh, size, layers=export.layers))
 
 
 register_format(
-    Format("dxf", (".dxf",), "the outlines in millimetres, for cutters (extra dxf)", _write, options=("size",))
+    Format("dxf", (".dxf",), "the outlines in millimetres, for cutters (extra dxf)", _write, options=("size", "layers"))
 )

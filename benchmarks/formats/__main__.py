@@ -1,6 +1,7 @@
 """Which program reads which of our files right: `python -m benchmarks.formats [--python PATH] [--node FOLDER]`.
 
-Six examples are built by `climb` and written in every way that a program reads. It is asked for the area, or for solids
+Six examples are built, by `climb` or with `--style modeller` as agents.solve does, and written in every way that a
+program reads. It is asked for the area, or for solids
 the volume, and for glTF the box as well; what is within 1e-5 of the mesh's own is right. Prints the tables of
 docs/formats.md. With `--solids FOLDER` slicers look at the solids of all sequences below it instead. Readers that are
 not installed are left out. Exit codes: 0 all is right, or right with an option that the cell names; 1 something is not;
@@ -34,6 +35,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--node", type=Path, metavar="FOLDER", help="where node_modules has three, @babylonjs/...")
     names = [name for name, *_ in READERS]
     parser.add_argument("--only", nargs="+", choices=names, default=names, help="these readers", metavar="READER")
+    parser.add_argument("--style", choices=("paper", "modeller"), default="paper", help="of the meshes (paper)")
     parser.add_argument("--solids", type=Path, metavar="FOLDER", help="as agents.solve writes them")
     given = parser.parse_args(arguments)
     asking = Asking((*given.python, sys.executable), given.node.resolve() if given.node else None)
@@ -42,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             lines, is_right = look_at_solids(given.solids, asking)
             print("\n".join(lines))
             return int(not is_right)
-        sequences = [construct(name) for name in NAMES]
+        sequences = [construct(name, given.style) for name in NAMES]
         with tempfile.TemporaryDirectory() as folder:
             files = {
                 kind: [

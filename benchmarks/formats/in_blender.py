@@ -1,4 +1,7 @@
-"""What Blender makes of files, as `readers.py` tells it: `blender -b --python in_blender.py -- ANSWER FILE...`."""
+"""What Blender makes of files, as `readers.py` tells it: `blender -b --python in_blender.py -- ANSWER FILE...`.
+
+Where Blender is a package, `python in_blender.py -- ANSWER FILE...`.
+"""
 
 import json
 import sys
@@ -19,7 +22,9 @@ def read(path: str) -> dict[str, object]:
     if ending == ".obj":
         bpy.ops.wm.obj_import(filepath=path, forward_axis="Y", up_axis="Z")
     elif ending == ".stl":
-        bpy.ops.import_mesh.stl(filepath=path)
+        (bpy.ops.wm.stl_import if bpy.app.version >= (4, 2, 0) else bpy.ops.import_mesh.stl)(filepath=path)
+    elif ending == ".usdc":
+        bpy.ops.wm.usd_import(filepath=path)
     elif ending == ".glb":
         bpy.ops.import_scene.gltf(filepath=path, import_shading="FLAT")
         bpy.context.scene.frame_set(round(max(action.frame_range[1] for action in bpy.data.actions)))

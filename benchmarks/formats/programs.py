@@ -14,6 +14,7 @@ from typing import Any
 from autopoly_env.errors import AutoPolyError
 from autopoly_env.export.blender import find_blender
 from benchmarks.formats.in_chromium import boxes
+from benchmarks.formats.in_godot import areas
 
 HERE = Path(__file__).parent
 SECONDS = 300.0  # for a reader and all its files
@@ -102,6 +103,52 @@ def ask_blender(_: str, asking: Asking, paths: Sequence[Path]) -> Answer | None:
     return told["version"], told["found"]
 
 
+def ask_bpy(_: str, asking: Asking, paths: Sequence[Path]) -> Answer | None:
+    """Blender as a package of one of the interpreters."""
+    for python in asking.pythons:
+        with tempfile.TemporaryDirectory() as folder:
+            answer = Path(folder, "answer.json")
+            _output(python, str(HERE / "in_blender.py"), "--", str(answer), *map(str, paths))
+            if answer.exists():
+                told = json.loads(answer.read_text())
+                return told["version"], told["found"]
+    return None
+
+
+def ask_godot(_: str, asking: Asking, paths: Sequence[Path]) -> Answer | None:
+    return areas(asking.node_folder, paths) if asking.node_folder else None
+
+
+def ask_inkscape(_: str, asking: Asking, paths: Sequence[Path]) -> Answer | None:
+    """What svgpathtools finds in what it writes of what it has read."""
+    if shutil.which("inkscape") is None:
+        return None
+    with tempfile.TemporaryDirectory() as folder:
+        made = [Path(folder, f"{k}.svg") for k in range(len(paths))]
+        for path, copy in zip(paths, made, strict=True):
+            _output("inkscape", str(path), "--export-plain-svg", f"--export-filename={copy}")
+        answer = ask_python("svgpathtools", asking, made)
+    return None if answer is None else (_first(r"Inkscape ([\d.]+)", _output("inkscape", "--version")), answer[1])
+
+
+def ask_openscad(_: str, asking: Asking, paths: Sequence[Path]) -> Answer | None:
+    """What it writes as STL of what it has read, drawings made 1 mm thick; it takes SVG to have 72 dots an inch."""
+    if shutil.which("openscad") is None:
+        return None
+    found: list[Found] = []
+    for path in paths:
+        is_drawing = path.suffix in (".svg", ".dxf")
+        with tempfile.TemporaryDirectory() as folder:
+            made, program = Path(folder, "made.stl"), Path(folder, "made.scad")
+            program.write_text("linear_extrude(1) import(name);" if is_drawing else "render() import(name);")
+            _output("openscad", "-o", str(made), "-D", f"name={json.dumps(str(path))}", str(program))
+            volume = _of_text_stl(made.read_text()) if made.exists() else float("nan")
+        scale = (72.0 / 25.4) ** 2 if path.suffix == ".svg" else 1.0
+        found.append({"area": volume * scale} if is_drawing else {"volume": volume})
+    done = subprocess.run(["openscad", "--version"], stdin=subprocess.DEVNULL, capture_output=True, text=True)
+    return _first(r"version ([\d.]+)", done.stdout + done.stderr), found
+
+
 Ask = Callable[[str, Asking, Sequence[Path]], Answer | None]
 
 # Reader, what it is called in the table, what it is asked by, and the variants that it reads at all.
@@ -118,12 +165,16 @@ READERS: tuple[tuple[str, str, Ask, tuple[str, ...]], ...] = (
     ("manifold3d", "manifold3d", ask_python, ("solid", "stl", "3mf")),
     ("assimp", "assimp", ask_assimp, ("obj", "solid", "gltf", "stl", "3mf")),
     ("blender", "Blender", ask_blender, ("obj", "solid", "gltf", "stl", "svg", "svg-layers")),
+    ("bpy", "Blender, bpy", ask_bpy, ("obj", "solid", "gltf", "stl", "svg", "svg-layers", "usd")),
     ("admesh", "admesh", ask_admesh, ("stl",)),
     ("prusa", "PrusaSlicer", ask_prusa, ("solid", "stl", "3mf")),
+    ("openscad", "OpenSCAD", ask_openscad, ("stl", "3mf", "svg", "dxf")),
+    ("inkscape", "Inkscape", ask_inkscape, ("svg",)),
     ("svgelements", "svgelements", ask_python, ("svg", "svg-layers")),
     ("svgpathtools", "svgpathtools", ask_python, ("svg", "svg-layers")),
     ("usd", "OpenUSD, usd-core", ask_python, ("usd",)),
     ("ezdxf", "ezdxf", ask_python, ("dxf",)),
+    ("godot", "Godot", ask_godot, ("godot",)),
     ("godot_parser", "godot-parser", ask_python, ("godot",)),
     ("pytiled_parser", "pytiled-parser", ask_python, ("tiled",)),
 )
@@ -146,6 +197,15 @@ def _output(*command: str) -> str:
 def _first(pattern: str, text: str) -> str:
     match = re.search(pattern, text)
     return match[1] if match else ""
+
+
+def _of_text_stl(text: str) -> float:
+    """The volume between the triangles of an STL in letters."""
+    corners = [tuple(map(float, row)) for row in re.findall(r"vertex (\S+) (\S+) (\S+)", text)]
+    volume = 0.0
+    for (a, b, c), (d, e, f), (g, h, i) in zip(corners[::3], corners[1::3], corners[2::3], strict=True):
+        volume += (a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g)) / 6.0
+    return volume
 
 
 def _of_stl(data: bytes) -> Found:

@@ -101,10 +101,14 @@ def svgpathtools(path: str) -> Measured:
 
 
 def ezdxf(path: str) -> Measured:
-    """The area between the outlines: they run round the material, holes the other way."""
+    """The area between the outlines: they run round the material, holes the other way. It has nothing to repair."""
     np = import_module("numpy")
+    drawing = import_module("ezdxf").readfile(path)
+    audit = drawing.audit()
+    if audit.errors or audit.fixes:
+        raise ValueError(f"{len(audit.errors)} errors, {len(audit.fixes)} repaired")
     total = 0.0
-    for line in import_module("ezdxf").readfile(path).modelspace().query("LWPOLYLINE[layer=='CUT']"):
+    for line in drawing.modelspace().query("LWPOLYLINE[layer=='CUT']"):
         x, y = np.array([point[:2] for point in line]).T
         total += 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
     return {"area": abs(total)}

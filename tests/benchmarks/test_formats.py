@@ -1,6 +1,7 @@
 """The table of readers: what counts as right, and a reader that is asked for real."""
 
 import shutil
+import struct
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +10,7 @@ import pytest
 
 from benchmarks.formats import __main__ as table
 from benchmarks.formats.files import VARIANTS, expected, write
+from benchmarks.formats.in_godot import packed
 from benchmarks.formats.programs import READERS, Asking, ask_python
 from benchmarks.formats.solids import look_at_solids
 from tests.helpers.sequences import gabled
@@ -30,6 +32,20 @@ def test_readers__are_asked_for_variants_that_there_are() -> None:
     assert {kind for *_, kinds in READERS for kind in kinds} <= set(VARIANTS)
     ways_out = {variant.way_out for variant in VARIANTS.values() if variant.way_out}
     assert ways_out <= set(VARIANTS) and all(bool(v.way_out) == bool(v.advice) for v in VARIANTS.values())
+
+
+def test_pack_for_godot__leads_to_its_files() -> None:
+    files = {"main.gd": b"extends Node\n", "0.tscn": b"[gd_scene format=3]\n"}
+    pack = packed(files)
+    assert struct.unpack_from("<4s5IQ", pack) == (b"GDPC", 2, 4, 0, 0, 0, 0)
+    (n,), at, found = struct.unpack_from("<I", pack, 96), 100, {}
+    for _ in range(n):
+        (length,) = struct.unpack_from("<I", pack, at)
+        name = pack[at + 4 : at + 4 + length].rstrip(b"\0").decode()
+        offset, size = struct.unpack_from("<QQ", pack, at + 4 + length)
+        found[name] = pack[offset : offset + size]
+        at += 4 + length + 8 + 8 + 16 + 4
+    assert found == {f"res://{name}": data for name, data in files.items()}
 
 
 @pytest.mark.slow

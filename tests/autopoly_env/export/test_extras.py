@@ -41,9 +41,9 @@ def test_dxf__has_the_outlines_in_millimetres(name: str, tmp_path: Path) -> None
     np.testing.assert_allclose(low, 80.0 * np.array((mesh.vertices[:, 0].min(), 1.0 - mesh.vertices[:, 1].max())))
 
 
-def test_dxf__keeps_inner_edges_on_a_layer_that_is_off(tmp_path: Path) -> None:
+def test_dxf_with_layers__has_inner_edges_on_one_that_is_off(tmp_path: Path) -> None:
     ezdxf = pytest.importorskip("ezdxf", reason="ezdxf is not installed (pip install ezdxf)")
-    (tmp_path / "ring.dxf").write_text(to_dxf(RING), encoding="utf-8")
+    (tmp_path / "ring.dxf").write_text(to_dxf(RING, layers=True), encoding="utf-8")
     drawing = ezdxf.readfile(tmp_path / "ring.dxf")
     lines = drawing.modelspace().query("LINE")
     assert {line.dxf.layer for line in lines} == {FOLDS} and len(lines) == 8
