@@ -70,7 +70,9 @@ func measured(path: String) -> Dictionary:
 			solid += abs(area(body.shape_owner_get_shape(owner, k).points))
 			n_shapes += 1
 	remove_child(body)
-	return {"area": solid, "drawn": drawn, "pieces": n_pieces, "shapes": n_shapes}
+	if n_shapes != n_pieces:
+		return {"error": "%d shapes of %d pieces" % [n_shapes, n_pieces]}
+	return {"area": solid, "drawn": drawn}
 
 func _ready() -> void:
 	var found := []

@@ -115,8 +115,13 @@ def ezdxf(path: str) -> Measured:
 
 
 def usd(path: str) -> Measured:
+    """None of its validators has anything to say."""
     package, np = import_module("pxr.UsdGeom"), import_module("numpy")
     stage = import_module("pxr.Usd").Stage.Open(path)
+    validation = import_module("pxr.UsdValidation")
+    validators = validation.ValidationRegistry().GetOrLoadAllValidators()
+    if said := validation.ValidationContext(validators).Validate(stage):
+        raise ValueError(said[0].GetMessage())
     area = volume = 0.0
     for prim in stage.Traverse():
         if not prim.IsA(package.Mesh):
