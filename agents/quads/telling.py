@@ -6,9 +6,9 @@ there closes a ring and is filled in. Branches are followed to their end before 
 closed last, so that whoever follows never goes back.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import groupby, pairwise
 
 from autopoly_env.arrays import FloatArray
 from autopoly_env.mesh import Face, PolyMesh
@@ -37,7 +37,7 @@ def order_of(mesh: PolyMesh, rank: int = 0, deep: bool = True) -> Iterator[Addit
         starts = _bodies(mesh, areas, waiting)
         start = starts[min(rank, len(starts) - 1)]
         yield Addition(mesh.faces[start], "start" if len(waiting) == len(mesh.faces) else "apart", n_parts)
-        for addition in _outwards(mesh, start, areas, waiting, n_parts, deep):
+        for addition in _branch_after_branch(_outwards(mesh, start, areas, waiting, n_parts, deep)):
             n_parts = max(n_parts, addition.part)
             yield addition
         n_parts += 1
@@ -73,6 +73,13 @@ def _hanging_together(faces: set[int], beside: dict[int, set[int]]) -> list[set[
             left -= fresh
         parts.append(part)
     return parts
+
+
+def _branch_after_branch(additions: Iterable[Addition]) -> Iterator[Addition]:
+    """The same, sorted by branch where faces follow each other whose corners are new: these need their branch alone."""
+    for is_new, run in groupby(additions, key=lambda addition: _RANK[addition.kind] == 0):
+        faces = list(run)
+        yield from sorted(faces, key=lambda addition: addition.part) if is_new else faces
 
 
 def _outwards(

@@ -65,6 +65,14 @@ def test_body__is_where_the_limbs_meet_unless_a_limb_is_much_larger() -> None:
     assert next(order_of(cross(0.59))).face == (8, 9, 1, 0)
 
 
+def test_branches__that_grow_at_once_are_told_one_after_the_other() -> None:
+    mesh = cut(Ring(BOX, -1), hole(small(BOX, 0.35, 0.5, 0.25)), hole(small(BOX, 0.65, 0.5, 0.25)))
+    additions = list(order_of(mesh, deep=False))
+    fresh = [addition.part for addition in additions if addition.kind in ("extrude", "cap")]
+    assert fresh == sorted(fresh)
+    assert len(set(fresh)) > 1
+
+
 def test_ring__is_closed_by_a_fill() -> None:
     mesh = cut(Ring(BOX, -1), hole(small(BOX, 0.5, 0.5, 0.5)))
     assert kinds(mesh) == {"start": 1, "extrude": 2, "fill": 1}
