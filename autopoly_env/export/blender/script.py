@@ -84,17 +84,13 @@ def _picture(target: Silhouette | None) -> str:
 
 def _build(sequence: ConstructionSequence, meshes: list[PolyMesh]) -> list[str]:
     """The lines of the function `build`."""
-    begin, ids = meshes[0], meshes[0].vertex_ids
-    faces = {
-        name: (ids[first], *(ids[v] for v in reversed(others)))
-        for name, (first, *others) in zip(begin.face_ids, begin.faces, strict=True)
-    }
+    begin = meshes[0]
     lines = [
         "def build() -> None:",
         '    """Every step: an operator, where the vertices went, and how many vertices, edges and faces there are."""',
         "    start(",
-        f"        {_dict_text(_places(begin), 8)},",
-        f"        {_dict_text(faces, 8)},",
+        f"        {_dict_text(places_of(begin), 8)},",
+        f"        {_dict_text(rings_of(begin), 8)},",
         f"        next_vertex={begin.next_vertex_id},",
         f"        next_face={begin.next_face_id},",
         "    )",
@@ -102,22 +98,28 @@ def _build(sequence: ConstructionSequence, meshes: list[PolyMesh]) -> list[str]:
     ]
     for number, (step, before, after) in enumerate(zip(sequence.steps, meshes, meshes[1:], strict=False), 1):
         lines += ["", f"    # Step {number}: IoU {step.score['iou']:.4f}, total {step.score['total']:.2f}"]
-        arguments = _arguments(step, number, before)
-        left = _places(after.with_vertices(unmoved(step, before, after)))
-        moved = {name: place for name, place in _places(after).items() if left[name] != place}
+        arguments = arguments_of(step, before)
+        if arguments is None:
+            raise SequenceError(
+                f"step {number}: {step.operator} is not known to the Blender script; "
+                "teach it there first, Operator.blender"
+            )
+        left = places_of(after.with_vertices(unmoved(step, before, after)))
+        moved = {name: place for name, place in places_of(after).items() if left[name] != place}
         lines.append(f"    {step.operator}({', '.join(map(repr, arguments))})")
         lines += [f"    move({_dict_text(moved, 4)})"] if moved else []
         lines.append(f"    expect({', '.join(map(str, after.counts))})")
     return lines
 
 
-def _arguments(step: Step, number: int, mesh: PolyMesh) -> list[Any]:
-    """What the script's function for a step from `mesh` is called with; lists of points are turned to y up."""
+def arguments_of(step: Step, mesh: PolyMesh) -> list[Any] | None:
+    """What the script's function for a step from `mesh` is called with; lists of points are turned to y up.
+
+    None for an operator that does not say.
+    """
     operator, element, choice = decoded(mesh, step)
     if operator.blender is None:
-        raise SequenceError(
-            f"step {number}: {operator.name} is not known to the Blender script; teach it there first, Operator.blender"
-        )
+        return None
     return [
         [_place(x, y) for x, y in value] if isinstance(value, list) else value
         for value in operator.blender(mesh, element, choice)
@@ -130,9 +132,18 @@ def _own_code(sequence: ConstructionSequence) -> list[str]:
     return [f"{code.strip()}\n\n" for name in names if (code := operator_named(name).blender_code)]
 
 
-def _places(mesh: PolyMesh) -> dict[int, Point]:
+def places_of(mesh: PolyMesh) -> dict[int, Point]:
     """Where the vertices lie in Blender, by id."""
     return {name: _place(x, y) for name, (x, y) in zip(mesh.vertex_ids, mesh.vertices.tolist(), strict=True)}
+
+
+def rings_of(mesh: PolyMesh) -> dict[int, tuple[int, ...]]:
+    """The corners of the faces in Blender, where they run the other way round, by id; the first one stays the first."""
+    ids = mesh.vertex_ids
+    return {
+        name: (ids[first], *(ids[v] for v in reversed(others)))
+        for name, (first, *others) in zip(mesh.face_ids, mesh.faces, strict=True)
+    }
 
 
 def _place(x: float, y: float) -> Point:

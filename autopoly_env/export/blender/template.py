@@ -50,19 +50,10 @@ def build() -> None:
 
 # --- what a step is in Blender ---
 
-FRAMES_PER_STEP = 24
-FRAMES_PER_MOVE = 16  # of these
-COLOUR, LINE_COLOUR = (0.32, 0.47, 0.76), (0.013, 0.018, 0.03)  # linear RGB
-MERGE_DISTANCE = 1e-5  # units; what is nearer to the axis of a half lies on it
-LINE_WIDTH, DOT_RADIUS = 0.0056, 0.009  # in rendered pictures, units of the unit square
-
 bm = bmesh.new()
 VERTEX_ID = bm.verts.layers.int.new("vertex_id")
 FACE_ID = bm.faces.layers.int.new("face_id")
 next_ids = {"vertex": 0, "face": 0}
-before_move: dict[int, tuple[float, float]] = {}  # where the last operator left the vertices
-records: list[dict[str, object]] = []  # of the start and of every step
-objects: list[bpy.types.Object] = []
 
 
 def vertex(name: int) -> bmesh.types.BMVert:
@@ -220,30 +211,6 @@ def edge_dissolve(a: int, b: int, keep: int) -> None:
     joined[FACE_ID] = keep
 
 
-def move(positions: dict[int, tuple[float, float]]) -> None:
-    """Vertices put elsewhere."""
-    before_move.update({v[VERTEX_ID]: (v.co.x, v.co.y) for v in bm.verts})
-    for name, (x, y) in positions.items():
-        vertex(name).co = (x, y, 0.0)
-
-
-def expect(n_vertices: int, n_edges: int, n_faces: int) -> None:
-    """Check the counts, which ends a step."""
-    found, expected = (len(bm.verts), len(bm.edges), len(bm.faces)), (n_vertices, n_edges, n_faces)
-    if found != expected:
-        raise RuntimeError(f"step {len(records)}: Blender has (V, E, F) = {found}, expected {expected}")
-    records.append(
-        {
-            "counts": found,
-            "vertices": {v[VERTEX_ID]: (v.co.x, v.co.y) for v in bm.verts},
-            "faces": {f[FACE_ID]: [v[VERTEX_ID] for v in f.verts] for f in bm.faces},
-        }
-    )
-    if KEYFRAMES:
-        add_object(f"{NAME} {len(records) - 1}")
-    before_move.clear()
-
-
 def cut(
     whole: bmesh.types.BMFace, a: bmesh.types.BMVert, b: bmesh.types.BMVert, way: tuple[tuple[float, ...], ...] = ()
 ) -> tuple[bmesh.types.BMFace, bmesh.types.BMFace, list[bmesh.types.BMVert]]:
@@ -287,7 +254,44 @@ def round_hole(points: list[tuple[float, float, float]], i: int, j: int) -> list
     return [(i + k) % len(points) for k in range((j - i) % len(points) + 1)]
 
 
+# --- what ends a step ---
+
+before_move: dict[int, tuple[float, float]] = {}  # where the last operator left the vertices
+records: list[dict[str, object]] = []  # of the start and of every step
+objects: list[bpy.types.Object] = []
+
+
+def move(positions: dict[int, tuple[float, float]]) -> None:
+    """Vertices put elsewhere."""
+    before_move.update({v[VERTEX_ID]: (v.co.x, v.co.y) for v in bm.verts})
+    for name, (x, y) in positions.items():
+        vertex(name).co = (x, y, 0.0)
+
+
+def expect(n_vertices: int, n_edges: int, n_faces: int) -> None:
+    """Check the counts, which ends a step."""
+    found, expected = (len(bm.verts), len(bm.edges), len(bm.faces)), (n_vertices, n_edges, n_faces)
+    if found != expected:
+        raise RuntimeError(f"step {len(records)}: Blender has (V, E, F) = {found}, expected {expected}")
+    records.append(
+        {
+            "counts": found,
+            "vertices": {v[VERTEX_ID]: (v.co.x, v.co.y) for v in bm.verts},
+            "faces": {f[FACE_ID]: [v[VERTEX_ID] for v in f.verts] for f in bm.faces},
+        }
+    )
+    if KEYFRAMES:
+        add_object(f"{NAME} {len(records) - 1}")
+    before_move.clear()
+
+
 # --- objects, thickness, time ---
+
+FRAMES_PER_STEP = 24
+FRAMES_PER_MOVE = 16  # of these
+COLOUR, LINE_COLOUR = (0.32, 0.47, 0.76), (0.013, 0.018, 0.03)  # linear RGB
+MERGE_DISTANCE = 1e-5  # units; what is nearer to the axis of a half lies on it
+LINE_WIDTH, DOT_RADIUS = 0.0056, 0.009  # in rendered pictures, units of the unit square
 
 
 def add_object(name: str) -> None:

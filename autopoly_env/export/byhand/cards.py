@@ -42,12 +42,13 @@ def cards_of(sequence: ConstructionSequence) -> list[Card]:
         wanted = _places(after)
         aims = {v: place for v, place in wanted.items() if v not in known or _is_seen(known[v], hand.places[v])}
         why = reason(number, step, before, after, parts)
-        cards.append(Card(step.operator, _taken(hand), aims, _picks(step, before), why))
+        picks = tuple(saying.element(*pick) for pick in picks_of(step, before))
+        cards.append(Card(step.operator, _taken(hand), aims, picks, why))
     return cards
 
 
-def _picks(step: Step, before: PolyMesh) -> tuple[str, ...]:
-    """What is pointed at of the mesh before a step."""
+def picks_of(step: Step, before: PolyMesh) -> tuple[tuple[str, Ids], ...]:
+    """What is pointed at of the mesh before a step: kinds, and ids of which edges have two, ascending."""
     picked: list[tuple[str, Ids]] = []
     for deed in operator_named(step.operator).told.keys(step):
         match deed:
@@ -61,7 +62,7 @@ def _picks(step: Step, before: PolyMesh) -> tuple[str, ...]:
             case str():
                 kind, ids = next(iter(step.element.items()))
                 picked.append((kind, tuple(ids) if isinstance(ids, list) else (ids,)))
-    return tuple(dict.fromkeys(saying.element(kind, tuple(sorted(ids))) for kind, ids in picked))
+    return tuple(dict.fromkeys((kind, tuple(sorted(ids))) for kind, ids in picked))
 
 
 def _is_seen(a: Place, b: Place) -> bool:

@@ -297,12 +297,16 @@ def done(asked: str, answer: str, fingers: "Fingers | None" = None) -> Iterator[
 
 
 def with_fingers(asked: str, answer: str) -> None:
-    """The same in a window, which works off its events in between."""
+    """The same in a window."""
     sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
     from fingers import Fingers  # beside this file
 
     fingers = Fingers(view, state)
-    work = done(asked, answer, fingers)
+    in_window(done(asked, answer, fingers))
+
+
+def in_window(work: Iterator[None]) -> None:
+    """Work that goes on whenever Blender has worked off its events, and ends it."""
 
     def go_on() -> float | None:
         try:
