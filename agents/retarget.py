@@ -30,7 +30,7 @@ Examples:
 
 \b
 OUT/<name of the image without its ending>/ gets what agents.solve writes: sequence.json,
-mesh.obj, mesh.svg, steps.png and player.html. The sequence replays from its own start.
+mesh.obj, mesh.svg, steps.png, player.html, lesson.json. The sequence replays from its own start.
 
 \b
 Printed are r_all on the new image: of the mesh as it was, of the same steps refitted,

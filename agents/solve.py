@@ -24,7 +24,7 @@ Build a polygon mesh of every silhouette and tell how, action by action.
 
 IMAGE is a file, a folder, or a pattern in quotes such as 'shapes/**/*.png'.
 For each, OUT/<its name>/ gets player.html (to watch, and to do by hand in
-Blender), steps.png, mesh.obj, mesh.svg and sequence.json.
+Blender), steps.png, mesh.obj, mesh.svg, sequence.json and lesson.json.
 
   --style STYLE    modeller (the default): quads, extruded part by part;
                    paper: the best score, few faces of many corners, told as
@@ -71,6 +71,7 @@ For every image, OUT/<name of the file without its ending>/ gets
   sequence.json  the actions, to be replayed    mesh.obj  the mesh, y up
   steps.png      every step over the target     mesh.svg  the mesh, to edit
   player.html    the construction, to be watched and done by hand in Blender
+  lesson.json    the same for the coach in Blender (docs/blender.md)
 and OUT/overview.png shows all meshes beside their pictures, if there are several images.
 
 \b

@@ -32,7 +32,7 @@ Examples:
 
 \b
 OUT/variants.png shows all of them, the given mesh first. OUT/variant-1/, OUT/variant-2/, ...
-get what agents.solve writes: sequence.json, mesh.obj, mesh.svg, steps.png, player.html.
+get what agents.solve writes: sequence.json, mesh.obj, steps.png, player.html and others.
 No mesh on the way crosses itself or has a flipped face (docs/variations.md).
 
 Exit codes: 0 all is well, 1 something failed, 2 wrong usage, 130 Ctrl-C.

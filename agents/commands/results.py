@@ -21,10 +21,11 @@ from autopoly_env.arrays import ByteArray
 from autopoly_env.details import Losses
 from autopoly_env.errors import AutoPolyError, OutputError
 from autopoly_env.export import contact_sheet, save_html, save_png, to_obj, to_svg
+from autopoly_env.export.coach import save_lesson
 from autopoly_env.shown import told
 from autopoly_env.silhouette import Silhouette, thumbnail
 
-RESULTS = ("sequence.json", "mesh.obj", "mesh.svg", "steps.png", "player.html")
+RESULTS = ("sequence.json", "mesh.obj", "mesh.svg", "steps.png", "player.html", "lesson.json")
 OVERVIEW = "overview.png"
 _STAGING = ".solve-"  # how folders begin in which results are completed; the number of the process follows
 _PATIENCE = 5.0  # seconds that a folder is left alone, lest one of another machine is taken
@@ -84,6 +85,7 @@ def write_results(
             (staging / "mesh.svg").write_text(to_svg(solution.mesh, target=silhouette), encoding="utf-8")
             save_png(contact_sheet(solution.sequence, silhouette), staging / "steps.png")
             save_html(solution.sequence, staging / "player.html", silhouette)
+            save_lesson(solution.sequence, staging / "lesson.json", silhouette)
             if with_mask:
                 save_mask(silhouette, staging / MASK)
             with shielded():

@@ -81,6 +81,7 @@ LISTED = (
     ("dxf", "dxf", "the outlines in millimetres, for cutters (extra dxf)"),
     ("godot", "godot", "a scene of Godot 4: Polygon2D and convex collision shapes"),
     ("convex-json", "convex", "convex pieces for physics engines, as a map of Tiled"),
+    ("coach", "coach", "what the coach in Blender teaches from, the picture with it"),
     ("mesh-png", "cutout", "the last mesh on a transparent background"),
     ("mask-png", "cutout", "what the last mesh covers, white on black"),
 )

@@ -32,7 +32,7 @@ from training import evaluate
 
 COLLAPSE = "examples.edge_collapse:edge_collapse"
 WITH_COLLAPSE = f"full,{COLLAPSE}"
-RESULTS = {"sequence.json", "mesh.obj", "mesh.svg", "steps.png", "player.html"}
+RESULTS = {"sequence.json", "mesh.obj", "mesh.svg", "steps.png", "player.html", "lesson.json"}
 
 try:
     find_blender()

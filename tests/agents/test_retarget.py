@@ -130,7 +130,8 @@ def test_command__writes_the_results_and_tells_what_was_kept(run: Run) -> None:
     assert f"steps: {kept} of 2 kept, {dropped} dropped, {added} added" in done.out
     assert kept + added == len(told.steps) and kept + dropped == 2
     assert "Open made/box/steps.png" in done.out
-    assert sorted(os.listdir("made/box")) == ["mesh.obj", "mesh.svg", "player.html", "sequence.json", "steps.png"]
+    drawn = ["mesh.obj", "mesh.svg", "player.html", "sequence.json", "steps.png"]
+    assert sorted(os.listdir("made/box")) == ["lesson.json", *drawn]
 
 
 def test_command__takes_the_object_that_the_options_name(run: Run) -> None:
