@@ -6,10 +6,10 @@ PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses=2
 INSTALL := $(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test quick lint format check bench clean
+.PHONY: help demo test quick lint format check bench extension clean
 
 help: ## this list
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-6s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 demo: .venv/installed-base ## build a mesh of every silhouette in examples/ and draw how it came about
 	@$(BIN)/python -m agents.solve examples --out out
@@ -34,6 +34,9 @@ check: lint test ## both lint and test: what has to pass before a change goes in
 
 bench: .venv/installed-bench ## measure the speed and quality; SILHOUETTES=DIR measures on that folder too
 	@$(BIN)/python -m benchmarks.run $(if $(SILHOUETTES),--silhouettes "$(SILHOUETTES)")
+
+extension: .venv/installed-base ## pack the coach for Blender into dist/
+	@$(BIN)/python -m blender.build
 
 clean: ## remove what was generated; .venv stays
 	rm -rf out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -29,6 +29,9 @@ LINES = [
     ("ray", PACKAGES, ("training/parallel",)),
 ]
 
+# What runs inside Blender imports nothing of AutoPoly; what packs it imports the world only.
+IN_BLENDER = sorted((ROOT / "blender").rglob("*.py"))
+
 # A notebook shows a sequence as the player, and the player is made of sequences. The one import that runs back up.
 DOORBELL = ("autopoly_env.sequence.sequence", "autopoly_env.export.player")
 
@@ -101,6 +104,14 @@ def test_module__is_imported_only_where_it_may_be(
         if name.split(".")[0] == module
     ]
     assert not trespassers
+
+
+def test_coach__runs_without_autopoly_and_nothing_of_autopoly_needs_it() -> None:
+    packages = {*PACKAGES, "benchmarks", "docs", "tests"}
+    for path in IN_BLENDER:
+        found = {name.split(".")[0] for name in imports_of(path)} & packages
+        assert found <= (set() if path.parent.name == "autopoly_coach" else {"autopoly_env"}), path
+    assert not [path for path in SOURCES if "blender" in {name.split(".")[0] for name in imports_of(path)}]
 
 
 # --- no circles ---

@@ -7,7 +7,7 @@ import pytest
 from tests.helpers.paths import ROOT
 
 TESTS = ROOT / "tests"
-MIRRORED = ("autopoly_env", "agents", "training", "benchmarks")
+MIRRORED = ("autopoly_env", "agents", "training", "benchmarks", "blender")
 FOLDERS = sorted({path.parent.relative_to(TESTS) for path in TESTS.rglob("*.py")})
 
 
