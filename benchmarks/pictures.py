@@ -1,10 +1,12 @@
 """How often the object of a picture is found: `python -m benchmarks.pictures [--cases DIR] [--sprites DIR]`.
 
 `--cases`: a folder of pictures as people have them, each with a known right mask (see RIGHT). `--sprites`: any folder
-of sprites with an alpha channel; they are put on white, on grey and on a colour, and masks are compared with alpha.
+of sprites with an alpha channel; they are put on white, on grey and on a colour, and masks are compared with alpha;
+with `--jpeg QUALITY` each is saved as JPEG before.
 """
 
 import argparse
+import io
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -149,10 +151,10 @@ def cases(folder: Path) -> Iterator[Found]:
             yield Found(path.name, iou(_picture_of(found), _as_large(right, found)), found.notes)
 
 
-def sprites(folder: Path, most: int | None = None) -> Iterator[tuple[str, Found | None]]:
+def sprites(folder: Path, most: int | None = None, quality: int | None = None) -> Iterator[tuple[str, Found | None]]:
     """Every sprite on every ground, by the ground's name, None where it is not to be seen on that.
 
-    `most` of them, evenly taken, if there are more.
+    `most` of them, evenly taken, if there are more; of a `quality` of JPEG where one is given.
     """
     paths = [path for path in sorted(folder.rglob("*.png")) if _is_sprite(path)]
     step = 1 if most is None else max(1, len(paths) // most)
@@ -163,7 +165,14 @@ def sprites(folder: Path, most: int | None = None) -> Iterator[tuple[str, Found 
             page = Image.new("RGBA", sprite.size, (*colour, 255))
             page.alpha_composite(sprite)
             shown = page.convert("RGB")
-            yield ground, _found_on(shown, right, path) if _is_seen(shown, colour, right) else None
+            given = shown if quality is None else _as_jpeg(shown, quality)
+            yield ground, _found_on(given, right, path) if _is_seen(shown, colour, right) else None
+
+
+def _as_jpeg(page: Image.Image, quality: int) -> Image.Image:
+    stream = io.BytesIO()
+    page.save(stream, "JPEG", quality=quality)
+    return Image.open(stream)
 
 
 def _found_on(page: Image.Image, right: BoolArray, path: Path) -> Found:
@@ -214,6 +223,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--cases", type=Path, metavar="DIR", help="pictures whose right masks are known")
     parser.add_argument("--sprites", type=Path, metavar="DIR", help="sprites with an alpha channel")
     parser.add_argument("--most", type=int, metavar="N", help="of the sprites, evenly taken")
+    parser.add_argument("--jpeg", type=int, metavar="QUALITY", help="of the JPEG that sprites are saved as before")
     parser.add_argument("--list", action="store_true", help="name the sprites that came out badly, too")
     options = parser.parse_args(arguments)
     console = Console() if sys.stdout.isatty() else Console(width=140)
@@ -221,7 +231,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.cases:
         n_wrong = _show_cases(list(cases(options.cases)), console)
     if options.sprites:
-        _show_sprites(list(sprites(options.sprites, options.most)), console, options.list)
+        _show_sprites(list(sprites(options.sprites, options.most, options.jpeg)), console, options.list)
     return int(n_wrong > 0)
 
 

@@ -6,13 +6,14 @@ from autopoly_env.arrays import BoolArray, Float32Array
 from autopoly_env.errors import SilhouetteError
 from autopoly_env.silhouette.background import Background, find_background
 from autopoly_env.silhouette.colours import hex_of, oklab, parse_colour
-from autopoly_env.silhouette.difference import STUDIED, beyond_cut, choose_cut, filled
+from autopoly_env.silhouette.difference import FAINT, SPRITE, STUDIED, beyond_cut, choose_cut, filled, paler_share
 from autopoly_env.silhouette.opinion import Opinion, View
 from autopoly_env.silhouette.options import ObjectOptions
 
 BLURRED = 0.7  # of the support of a sharp outline
 PRESENT, PRESENT_SHARE = 0.1, 1e-4  # a colour is in the picture if so many pixels are so close to it
 HOLLOW, LOWERED = 0.1, 0.02  # so much of an object is hole: worth a word, if a cut so low may find more of it
+PALER = {FAINT: 0.15, LOWERED: 0.2}  # of a sprite, by which a cut so low makes it larger: worth a word
 LIKE = 0.12  # of the object's colour is what is this close to it, where nothing was said about the background
 
 
@@ -30,18 +31,33 @@ def opinion(view: View) -> Opinion | None:
     name = hex_of(background.colour)
     if background.field is None:
         notes = [f"object is what differs in colour from the background, {name}, by more than {cut.level:.2f}"]
-        remarks = []
+        doubts = []
     else:
         notes = [f"object is what differs by more than {cut.level:.2f} from a background whose light is uneven"]
-        remarks = ["warning: the light is uneven: is it a photo?"]
+        doubts = ["warning: the light is uneven: is it a photo?"]
+    remarks = []
     if not cut.is_sharp:
         remarks.append("the outline is soft: --threshold says where it is cut")
     enclosed = _enclosed_share(mask) if cut.level > LOWERED else 0.0
     if enclosed > HOLLOW:
         words = f"{enclosed:.0%} of what its outline encloses looks like the background"
         remarks.append(f"{words}: --background '{name}' --threshold {LOWERED} takes more of it")
+    if max(mask.shape) < SPRITE:
+        doubts += _doubts_on_pale_parts(mask, distances, cut.level, name)
     is_even = background.is_even and cut.is_sharp
-    return Opinion(mask, tuple(notes), support, tuple(remarks), name, background.is_flat, is_even)
+    return Opinion(
+        mask, tuple(notes), support, tuple(remarks), tuple(doubts), name, is_clear=background.is_flat, is_even=is_even
+    )
+
+
+def _doubts_on_pale_parts(mask: BoolArray, distances: Float32Array, level: float, name: str) -> list[str]:
+    """A word where a lower cut would find much more: in a small picture that was compressed nobody can tell."""
+    for lower, most in PALER.items():
+        share = paler_share(mask, distances, lower) if lower < level else 0.0
+        if share > most:
+            words = f"{share:.0%} more differs a little, pale parts or what compression left"
+            return [f"{words}: --background '{name}' --threshold {lower} takes that in"]
+    return []
 
 
 def _enclosed_share(mask: BoolArray) -> float:

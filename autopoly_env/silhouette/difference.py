@@ -127,6 +127,12 @@ def _are_mixtures(
     return found
 
 
+def paler_share(mask: BoolArray, distances: Float32Array, level: float) -> float:
+    """How much larger a mask (H, W) and its holes are with all that lies beyond a lower cut: pale parts, or traces."""
+    size = int(np.count_nonzero(filled(mask)))
+    return int(np.count_nonzero(filled(mask | (distances > level)))) / max(1, size) - 1.0
+
+
 def _outermost(mask: BoolArray) -> BoolArray:
     """Pixels of the mask that have one beside them that is not in it; beyond the picture everything is."""
     inside = mask.copy()

@@ -141,21 +141,23 @@ def _chosen(view: View) -> Opinion | None:
     """Colour or lightness; None if neither sees anything."""
     colour = by_colour.opinion(view)
     lightness = by_lightness.split(view) if np.ptp(view.levels) > 0 else None
-    if colour is None or lightness is None:
-        return colour or lightness
+    if lightness is None:
+        return None if colour is None else colour.with_remarks()
+    if colour is None:
+        return lightness.saying("colour finds none that stands out from the border: --background COLOUR says from what")
     agreed = are_alike(colour.mask, lightness.mask, AGREED)
     if agreed and not lightness.is_clear and (colour.is_clear or colour.support >= TRUSTED):
-        return colour.saying(*colour.remarks)
+        return colour.with_remarks()
     if agreed:
-        warnings = [remark for remark in colour.remarks if remark.startswith("warning")]
-        return Opinion(lightness.mask, (*lightness.notes, *warnings), max(colour.support, lightness.support))
+        notes = (*lightness.notes, *colour.doubts)
+        return Opinion(lightness.mask, notes, max(colour.support, lightness.support))
     unseen = colour.is_even and np.count_nonzero(lightness.mask) < UNSEEN * np.count_nonzero(colour.mask)
     if colour.is_clear or unseen or colour.support >= (lightness.support if lightness.is_clear else TRUSTED):
         other = "light" if "lighter" in lightness.notes[1] else "dark"
         share = f"{_share(lightness.mask, colour.mask)} of this: --object {other}"
-        return colour.saying(*colour.remarks, f"lightness alone would find another object, {share}")
+        return colour.with_remarks().saying(f"lightness alone would find another object, {share}")
     share = f"{_share(colour.mask, lightness.mask)} of this: --background '{colour.colour}'"
-    return lightness.saying(*lightness.remarks, f"colour alone would find another object, {share}")
+    return lightness.saying(f"colour alone would find another object, {share}")
 
 
 def _share(mask: BoolArray, of: BoolArray) -> str:

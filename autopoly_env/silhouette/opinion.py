@@ -50,7 +50,8 @@ def view_of(grey: Float32Array, colour: ByteArray | None) -> View:
 class Opinion:
     """A mask (H, W) of the object, how it came about, and how well the picture supports it, 0 to 1.
 
-    `remarks` are what is said beside `notes` only where another opinion is worth a word; `colour` is the background's;
+    `remarks` are what is said beside `notes` where this opinion is taken, `doubts` also where another one agrees with
+    it; `colour` is the background's;
     `is_clear` says that the background is flat, or that a picture has but two levels of grey; `is_even` that the
     background is flat but for noise.
     """
@@ -59,6 +60,7 @@ class Opinion:
     notes: tuple[str, ...]
     support: float
     remarks: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
     colour: str = ""
     is_clear: bool = False
     is_even: bool = False
@@ -66,6 +68,10 @@ class Opinion:
     def saying(self, *words: str) -> "Opinion":
         """The same with more notes."""
         return replace(self, notes=(*self.notes, *words))
+
+    def with_remarks(self) -> "Opinion":
+        """The same with all that is to be said where it is taken."""
+        return self.saying(*self.doubts, *self.remarks)
 
 
 def are_alike(one: BoolArray, other: BoolArray, most: float) -> bool:

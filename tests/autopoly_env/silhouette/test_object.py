@@ -222,6 +222,30 @@ def test_sprite__saved_as_jpeg_is_found_to_its_borders(ground: tuple[int, int, i
     assert iou(load_silhouette(encoded(picture, "JPEG", quality=quality)).mask, mask) > 0.95
 
 
+@pytest.mark.parametrize("quality", [75, 90])
+def test_pale_part_of_a_small_jpeg__that_was_missed_is_asked_about_and_taken_by_the_option(quality: int) -> None:
+    parts = [(disc(512, 0.4), (225, 200, 190)), (disc(512, 0.2, (0.5, 0.4)), (40, 60, 90))]
+    picture, mask = antialiased(64, parts, (200, 200, 200))
+    compressed = encoded(picture, "JPEG", quality=quality)
+    silhouette = load_silhouette(compressed)
+    assert iou(silhouette.mask, mask) < 0.5
+    assert says(silhouette, "more differs a little, pale parts or what compression left: --background '#c")
+    assert iou(load(compressed, background="#c8c8c8", threshold=0.03).mask, mask) > 0.8
+
+
+@pytest.mark.parametrize("quality", [75, 90])
+def test_small_jpeg__without_pale_parts_asks_nothing(quality: int) -> None:
+    picture, mask = antialiased(64, [(disc(512, 0.4), (40, 60, 90))], (200, 200, 200))
+    silhouette = load_silhouette(encoded(picture, "JPEG", quality=quality))
+    assert iou(silhouette.mask, mask) > 0.95
+    assert not says(silhouette, "--")
+
+
+def test_colour__that_finds_nothing_says_so() -> None:
+    halves = np.where(np.arange(32) < 16, 200, 184) + np.random.default_rng(0).integers(-3, 4, (32, 32))
+    assert says(load_silhouette(halves.astype(np.uint8)), "colour finds none that stands out from the border")
+
+
 def test_noise__is_refused_and_an_honest_pattern_is_not() -> None:
     rng = np.random.default_rng(0)
     for shape in ((64, 64), (64, 64, 3)):
