@@ -76,6 +76,16 @@ def test_target__is_drawn_at_the_place_of_its_pixels() -> None:
     assert colour_at(frame, 0.1, 0.6) == viewer.PAPER
 
 
+def test_target__of_few_pixels_has_their_corners_and_a_large_one_is_smooth() -> None:
+    mask = np.zeros((2, 2), np.bool_)
+    mask[0, 0] = True
+    mesh = PolyMesh.rectangle(0.8, 0.8, 0.9, 0.9)
+    assert colour_at(draw_mesh(mesh, Silhouette(mask), size=200), 0.48, 0.48) == viewer.BARE
+    large = np.zeros((64, 64), np.bool_)
+    large[31, 31] = True
+    assert colour_at(draw_mesh(mesh, Silhouette(large), size=800), 31.1 / 64, 31.1 / 64) == viewer.PAPER
+
+
 def test_mesh_that_leaves_the_page__is_cut_off() -> None:
     frame = draw_mesh(PolyMesh.rectangle(-3.0, 0.4, 0.5, 0.6))
     assert tuple(frame[128, 0]) == viewer.MATCH
