@@ -4,11 +4,16 @@ import numpy as np
 
 from autopoly_env.arrays import BoolArray, IntArray
 from autopoly_env.silhouette.background import border
+from autopoly_env.silhouette.connectivity import label_holes, label_parts, meets_in_corners
 from autopoly_env.silhouette.options import ObjectOptions
 
 MIN_SPECK, SPECK_SHARE = 4, 2e-5  # smaller components are specks, smaller holes pinholes: pixels, of the picture's area
 SMALL_SHARE = 0.0025  # of a small picture's area, in which a pixel is a detail
 FEW = 8  # parts
+DUST, DUST_SHARE = 10, 0.005  # times as large as a speck, and of the largest part: smaller parts may be dust
+SOME = 3  # of it are worth a word
+FINEST = 256  # pixels a side, at which a mesh's parts and holes are counted
+DITHERED = 0.25  # of the object: so many pinholes are a pattern, of which notches along its border are a part
 PATTERN = 0.5  # of the object: so many specks are no dirt, they are what is drawn
 
 
@@ -18,7 +23,7 @@ def clean(mask: BoolArray, options: ObjectOptions) -> tuple[BoolArray, list[str]
     What has fewer pixels than `options.min_speck` is dirt; by default 4 or 2e-5 of the picture's area, and less in a
     small picture (down to none: below 25 x 25 a pixel counts). Object pixels are joined over corners too (8
     neighbours), those of the background over sides (4). The notes say what was done, and what a user may not expect of
-    the mask: several parts, holes, the image's border touched.
+    the mask: several parts, holes (as a tracer sees them, `connectivity`), the image's border touched.
     """
     least = 0 if options.keep_specks else options.min_speck
     if least is None:
@@ -36,11 +41,19 @@ def clean(mask: BoolArray, options: ObjectOptions) -> tuple[BoolArray, list[str]
     pinholes, n_pinholes = _smaller_than(least, labels, enclosed)
     n_holes = len(enclosed) - n_pinholes
     if n_pinholes and (pinholes == mask).any():
+        filled = f"{counted(n_pinholes, 'pinhole')} of less than {least} pixels filled"
+        if is_dithered := pinholes.sum() >= DITHERED * mask.sum():
+            filled = f"{filled}, a pattern of them is taken for grey: --keep-specks keeps it"
         mask = mask | pinholes
-        notes.append(f"{counted(n_pinholes, 'pinhole')} of less than {least} pixels filled")
+        if is_dithered:
+            mask = _without_notches(mask)
+        notes.append(filled)
         n_parts = parts(mask)[1]  # what lay in a pinhole is joined now
+    if max(mask.shape) <= FINEST and meets_in_corners(mask):  # of what is larger, nobody sees these corners
+        shown = square(mask)[0].astype(np.float64)
+        n_parts, n_holes = int(label_parts(shown).max()), int(label_holes(shown).max())
     if n_parts > 1:
-        notes.append(f"object has {n_parts} separate parts")
+        notes.append(f"object has {n_parts} separate parts{_word_on_dust(mask, least) if n_parts > SOME else ''}")
     if n_holes:
         notes.append(f"object has {counted(n_holes, 'hole')}")
     if border(mask).any():
@@ -81,6 +94,24 @@ def holes(mask: BoolArray) -> tuple[IntArray, IntArray]:
 def counted(count: int, noun: str) -> str:
     """Such as "1 hole", "2 holes"."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def _word_on_dust(mask: BoolArray, least: int) -> str:
+    """How many parts are hardly more than specks, which have less than `least` pixels, and what drops them, too."""
+    labels, n_parts = parts(mask)
+    sizes = np.sort(np.bincount(labels.ravel(), minlength=n_parts + 1)[1:])
+    dust = sizes[sizes < min(DUST * least, DUST_SHARE * sizes[-1])]
+    if len(dust) < SOME:
+        return ""
+    return f", {len(dust)} of at most {dust[-1]} pixels: --min-speck {dust[-1] + 1} drops those"
+
+
+def _without_notches(mask: BoolArray) -> BoolArray:
+    """The mask (H, W) with its notches filled that are a pixel wide, as a pattern has along its border."""
+    from scipy.ndimage import binary_closing
+
+    closed: BoolArray = binary_closing(np.pad(mask, 2), np.ones((3, 3), dtype=bool))[2:-2, 2:-2]
+    return closed
 
 
 def _smaller_than(n_pixels: int, labels: IntArray, numbers: IntArray) -> tuple[BoolArray, int]:

@@ -50,6 +50,12 @@ def label_holes(coverage: FloatArray) -> IntArray:
     return numbers.reshape(labels.shape)[1:-1, 1:-1]
 
 
+def meets_in_corners(mask: BoolArray) -> bool:
+    """Whether two pixels of a mask (H, W) meet diagonally and have none in common beside them."""
+    ways = (_diagonals(mask, falling=falling) for falling in (True, False))
+    return any(bool((a & b & ~c & ~d).any()) for (a, b), (c, d) in ways)
+
+
 def is_slanting_line(mask: BoolArray) -> bool:
     """Whether a mask (R, R) is nothing but lines one pixel wide, some of which hang together by corners alone."""
     if _thick(mask).any():

@@ -246,6 +246,27 @@ def test_colour__that_finds_nothing_says_so() -> None:
     assert says(load_silhouette(halves.astype(np.uint8)), "colour finds none that stands out from the border")
 
 
+def test_dust__is_told_apart_with_the_option_that_drops_it() -> None:
+    picture = painted(chair())
+    for row, column in ((6, 66), (6, 78), (18, 66), (18, 78)):
+        assert not chair()[row - 2 : row + 5, column - 2 : column + 5].any()
+        picture[row : row + 3, column : column + 2] = 0
+    silhouette = load_silhouette(picture)
+    assert "object has 5 separate parts, 4 of at most 6 pixels: --min-speck 7 drops those" in silhouette.notes
+    assert np.array_equal(load(picture, min_speck=7).mask, chair())
+
+
+def test_checkerboard__of_pixels_is_grey_up_to_its_border_and_one_of_blocks_is_parts() -> None:
+    odd = np.add.outer(np.arange(64), np.arange(64)) % 2 == 1
+    square = np.zeros((64, 64), dtype=bool)
+    square[10:54, 10:54] = True
+    silhouette = load_silhouette(painted(square & odd))
+    assert (silhouette.mask ^ square).sum() <= 2  # a corner is a pixel of the ground, for all that can be seen
+    assert says(silhouette, "a pattern of them is taken for grey: --keep-specks keeps it")
+    blocks = np.kron(np.add.outer(np.arange(6), np.arange(6)) % 2 == 1, np.ones((8, 8), dtype=bool))
+    assert "object has 18 separate parts" in load_silhouette(painted(np.pad(blocks, 8))).notes
+
+
 def test_noise__is_refused_and_an_honest_pattern_is_not() -> None:
     rng = np.random.default_rng(0)
     for shape in ((64, 64), (64, 64, 3)):
