@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from agents.commands.styles import STYLES
 from agents.solution import Solution
 from agents.trace.agent import TraceAgent, TraceConfig
 from agents.trace.outline import Outline
@@ -14,6 +15,7 @@ _PRICES = (0.3, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002)  # of an element, that
 _FEW_PLACES = 4  # places where mesh and picture differ that are not worth a word
 _SEEN = 0.95  # IoU, about, of an outline that has the small details
 _STEPS = (1000, 10_000)
+_FEW_RINGS = 10  # parts and holes that a wish keeps in quads, as far as was tried
 
 
 def losses_of(solution: Solution, simulator: Simulator) -> Losses:
@@ -37,7 +39,7 @@ def in_words(losses: Losses, simulator: Simulator) -> str:
         lost.append(f"they differ in {n_small} small details" if lost else f"{n_small} small details are lost")
     if not lost:
         return ""
-    return f"{', and '.join(lost)}{_advice(simulator, n_lost > 0, n_small >= _FEW_PLACES)}"
+    return f"{', and '.join(lost)}{_advice(losses, simulator, n_lost > 0, n_small >= _FEW_PLACES)}"
 
 
 def record_of_losses(losses: Losses) -> dict[str, Any]:
@@ -49,13 +51,26 @@ def record_of_losses(losses: Losses) -> dict[str, Any]:
     }
 
 
-def _advice(simulator: Simulator, rings_lost: bool, details_lost: bool) -> str:
+def _advice(losses: Losses, simulator: Simulator, rings_lost: bool, details_lost: bool) -> str:
+    """Which option keeps what is lost; under a rule of faces a wish for a few parts and holes, or the paper's style."""
+    if simulator.faces == "any":
+        return _price_that_keeps(simulator, rings_lost, details_lost)
+    is_few = losses.n_parts + losses.n_holes <= _FEW_RINGS
+    if is_few and not details_lost and not simulator.guidance.keep:
+        has_parts, has_holes = losses.n_parts_kept == losses.n_parts, losses.n_holes_kept == losses.n_holes
+        return f": --keep {'holes' if has_parts else 'parts' if has_holes else 'all'} keeps them"
+    style = STYLES["paper"]
+    paper = Simulator(simulator.silhouette, operators=style.operators, weights=simulator.weights)
+    return _price_that_keeps(paper, rings_lost, details_lost, " --style paper")
+
+
+def _price_that_keeps(simulator: Simulator, rings_lost: bool, details_lost: bool, options: str = "") -> str:
     """The highest price at which a tracer keeps them, and what it takes."""
     rings = trace_rings(simulator.silhouette)
     details = Details.of(simulator.silhouette)
     everything = len(details.parts), len(details.holes)
     for price in _PRICES:
-        if price >= simulator.weights.w_sc:
+        if price > simulator.weights.w_sc or (price == simulator.weights.w_sc and not options):
             continue
         outline = _traced(simulator, price)
         if outline is None or (rings_lost and details.kept(outline.loops) != everything):
@@ -66,7 +81,7 @@ def _advice(simulator: Simulator, rings_lost: bool, details_lost: bool) -> str:
         if steps is None or not rings:
             break
         more = "" if steps == simulator.max_steps else f" --max-steps {steps}"
-        return f": --w-sc {price:g}{more} keeps them (about {outline.complexity} elements)"
+        return f":{options} --w-sc {price:g}{more} keeps them (about {outline.complexity} elements)"
     return ""
 
 

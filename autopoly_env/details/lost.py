@@ -1,6 +1,6 @@
 """Parts, holes and small details of a picture: which of them a mesh has."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -13,6 +13,9 @@ from autopoly_env.raster import coverage
 from autopoly_env.silhouette import Silhouette, label_holes, label_parts
 
 _SMALL = 2  # pixels at FINEST: a place is a detail if this much can be taken off all around it
+_LOW = 6  # pixels at FINEST: and it is deeper than this,
+_DEEP = 0.4  # and than this share of its width: the sliver between a circle and a chord is not
+_FEW = 25  # pixels a side, from which on a single pixel is none
 
 
 @dataclass(frozen=True)
@@ -43,7 +46,7 @@ class Losses:
     n_holes: int
     n_parts_kept: int
     n_holes_kept: int
-    n_places: int  # where mesh and picture differ by more than a seam, lost parts and holes among them
+    n_places: int  # where one stands out from the other, lost parts and holes among them
 
     @classmethod
     def of(cls, mesh: PolyMesh, silhouette: Silhouette) -> "Losses":
@@ -101,12 +104,46 @@ def _signed_area(loop: FloatArray) -> float:
 
 
 def _n_places(mesh: PolyMesh, silhouette: Silhouette) -> int:
-    """In how many places mesh and silhouette differ by more than a seam along the boundary."""
+    """In how many places a silhouette stands out from a mesh, or a mesh from a silhouette.
+
+    No places are seams along the boundary, and slivers, which a coarse outline leaves of a curve.
+    """
     size = min(silhouette.resolution, FINEST)
+    n_off = _SMALL * size // FINEST
+    least = max(_LOW * size // FINEST, int(size >= _FEW))
     wanted, shown = silhouette.target(size).mask, coverage(mesh, size) >= 0.5
     n_places = 0
-    for differs in (wanted & ~shown, shown & ~wanted):
-        for _ in range(_SMALL * size // FINEST):
+    for differs, beyond in ((wanted & ~shown, shown), (shown & ~wanted, ~shown)):
+        for _ in range(n_off):
             differs = _eroded(differs)
-        n_places += int(label_parts(differs.astype(np.float64)).max(initial=0))
+        if differs.any():
+            depth = _distance_to(beyond)
+            n_places += sum(_stands_out(depth[place], n_off, least) for place in _places(differs))
     return n_places
+
+
+def _places(mask: BoolArray) -> Iterator[tuple[IntArray, ...]]:
+    """The pixels (rows, columns) of each of its parts."""
+    labels = label_parts(mask.astype(np.float64))
+    for name in range(1, int(labels.max(initial=0)) + 1):
+        yield np.nonzero(labels == name)
+
+
+def _stands_out(depth: FloatArray, n_off: int, least: int) -> bool:
+    """Whether a place, `n_off` pixels taken off around it, is deep for the width along which it lies on the boundary.
+
+    `depth` (N,) are the distances of its pixels to what lies beyond the boundary.
+    """
+    width = int(np.count_nonzero(depth < n_off + 2)) + 2 * n_off
+    deepest = float(depth.max()) + n_off
+    return deepest > least and deepest >= _DEEP * width
+
+
+def _distance_to(mask: BoolArray) -> FloatArray:
+    """How far every pixel is from the nearest of a mask, in pixels; infinitely where that is empty."""
+    from scipy.ndimage import distance_transform_edt
+
+    if not mask.any():
+        return np.full(mask.shape, np.inf)
+    distances: FloatArray = distance_transform_edt(~mask)
+    return distances

@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 import shapely
 
+from agents.budget import Budget
 from agents.commands.losses import in_words, losses_of
 from agents.registry import make_agent
+from autopoly_env.details import Losses
 from autopoly_env.errors import ConfigError
-from autopoly_env.mesh import is_sane
+from autopoly_env.mesh import PolyMesh, is_sane
 from autopoly_env.score import ScoreWeights
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator
@@ -59,6 +61,23 @@ def test_losses__are_told_with_the_price_that_keeps_them() -> None:
     kept = make_agent("trace").solve(Simulator(plate_with_holes(), weights=ScoreWeights(w_sc=0.5 * price)))
     assert kept.mesh.topology.n_holes == 3
     assert in_words(losses_of(kept, game), game) == ""
+
+
+def test_losses__in_quads_are_told_with_the_wish_that_keeps_them_or_the_other_style() -> None:
+    game = Simulator(plate_with_holes(), operators="modeller", faces="quads")
+    plate = PolyMesh.rectangle(0.125, 0.125, 0.875, 0.875)
+    words = in_words(Losses.of(plate, game.silhouette), game)
+    assert words == "the picture has 3 holes, the mesh none: --keep holes keeps them"
+    wished = Simulator(plate_with_holes(), operators="modeller", faces="quads", keep="holes")
+    assert in_words(Losses.of(plate, game.silhouette), wished).startswith(
+        "the picture has 3 holes, the mesh none: --style paper --w-sc 0."
+    )
+
+
+@pytest.mark.slow
+def test_losses__in_quads_are_kept_by_the_wish_that_is_told() -> None:
+    game = Simulator(plate_with_holes(), operators="modeller", faces="quads", keep="holes")
+    assert make_agent("quads").solve(game, Budget(200)).mesh.topology.n_holes == 3
 
 
 @pytest.mark.parametrize("agent", ["trace", "decimate"])

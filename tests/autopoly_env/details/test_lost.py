@@ -5,6 +5,7 @@ import shapely
 
 from autopoly_env.details import Details, Losses
 from autopoly_env.mesh import PolyMesh
+from autopoly_env.silhouette import Silhouette
 from tests.helpers.drawings import painted
 
 SIZE = 64
@@ -54,3 +55,16 @@ def test_losses__count_places_that_differ_by_more_than_a_seam() -> None:
     comb = painted(shapely.union_all([back, *teeth]), 256)
     assert Losses.of(boxes((0.125, 0.5, 0.875, 0.875)), comb) == Losses(1, 0, 1, 0, 6)
     assert Losses.of(boxes((0.12, 0.5, 0.88, 0.875)), painted(back, 256)) == Losses(1, 0, 1, 0, 0)
+
+
+def test_losses__count_no_slivers_that_a_coarse_outline_leaves_of_a_curve() -> None:
+    disc = shapely.Point(0.5, 0.5).buffer(0.35)
+    angles = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
+    octagon = PolyMesh.from_faces(0.5 + 0.36 * np.stack((np.cos(angles), np.sin(angles)), axis=1), [tuple(range(8))])
+    assert Losses.of(octagon, painted(disc, 256)) == Losses(1, 0, 1, 0, 0)
+
+
+def test_losses__count_no_single_pixels_of_a_picture_of_many() -> None:
+    notched = painted(shapely.box(0.25, 0.25, 0.75, 0.75), SIZE).mask.copy()
+    notched[16, 17:48:2] = False
+    assert Losses.of(boxes((0.25, 0.25, 0.75, 0.75)), Silhouette(notched)) == Losses(1, 0, 1, 0, 0)
