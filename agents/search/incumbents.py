@@ -17,10 +17,10 @@ SHARE = 0.6  # of what is left of the budget, that an incumbent may use
 _MOST_AT_ONCE = 2  # steps of a sequence that are one of the simulator's: an action and its mirror image
 
 
-def play(agents: Sequence[Agent], simulator: Simulator, meter: Meter, n_most: int | None = None) -> Iterator[Solution]:
+def play(agents: Sequence[Agent], simulator: Simulator, meter: Meter) -> Iterator[Solution]:
     """The agents' solutions, as far as the budget goes. Raises KeyboardInterrupt after one that was interrupted.
 
-    Each has a share of what is left of the budget; where that has no limits, `n_most` refits.
+    Each has a share of what is left of the budget; where that has no limits, it has none.
 
     Agents that do not suit the simulator, by its guidance, rule of faces or operators, are left out.
     """
@@ -29,8 +29,7 @@ def play(agents: Sequence[Agent], simulator: Simulator, meter: Meter, n_most: in
             return
         if not agent.suits(simulator):
             continue
-        budget = meter.rest().share(SHARE)
-        solution = _solve_within(agent, simulator, meter, budget if n_most is None else Budget(n_most))
+        solution = _solve_within(agent, simulator, meter, meter.rest().share(SHARE))
         yield solution
         if solution.stats.stopped_by == "interrupted":
             raise KeyboardInterrupt

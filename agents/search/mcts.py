@@ -24,7 +24,6 @@ from agents.solution import Solution, Track
 from autopoly_env.operators import STOP
 from autopoly_env.simulator import Simulator, State
 
-_FREE = 2  # times `n_refits`, that each incumbent may take where no budget is given
 _LEAST_SHARE = 0.16  # of `n_refits` for the search, however much the incumbents took
 _EVALUATORS: dict[str, type[UniformEvaluator]] = {"residual": ResidualEvaluator, "uniform": UniformEvaluator}
 
@@ -67,8 +66,8 @@ class MctsAgent(Agent):
     ) -> Solution:
         """As every agent; never worse than the incumbents.
 
-        Without a budget each incumbent may take twice `config.n_refits`, which lets nearly all run to their end; the
-        search has what they leave of `config.n_refits`, or a share of it where they leave less.
+        Without a budget each incumbent runs to its end, as it does alone; the search has what they leave of
+        `config.n_refits`, or a share of it where they leave less.
         """
         meter = Meter(budget or Budget(), on_progress)
         finds = _Finds(Track(simulator.initial()), Tops(Hill(simulator)) if self._hops(simulator) else None)
@@ -83,7 +82,7 @@ class MctsAgent(Agent):
     def _run_stages(self, simulator: Simulator, finds: "_Finds", meter: Meter, *, is_free: bool) -> None:
         """Seeds; a tree from the best shape and one from the rectangle; hops from outline to outline."""
         initial = finds.best
-        for solution in play(self._incumbents, simulator, meter, self._config.n_refits * _FREE if is_free else None):
+        for solution in play(self._incumbents, simulator, meter):
             finds.incumbents.append(solution)
             finds.offer(simulator, track_of(simulator, solution.sequence))
         if initial.state.done:

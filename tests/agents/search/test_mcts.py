@@ -128,22 +128,34 @@ def test_seeds__do_not_keep_the_search_from_the_rectangle() -> None:
     assert both.stats.n_refits >= pure.stats.n_refits + make_agent("trace").solve(game).stats.n_refits
 
 
+class Spy(Agent):
+    """Traces, and notes the budgets that it is given."""
+
+    def __init__(self, asked: list[Budget | None]) -> None:
+        self._asked = asked
+
+    def act(self, simulator: Simulator, state: State) -> Decision:
+        return Decision(STOP)
+
+    def solve(self, simulator: Simulator, budget: Budget | None = None, on_progress: Any = None) -> Solution:
+        self._asked.append(budget)
+        return make_agent("trace").solve(simulator, budget, on_progress)
+
+
 def test_seeds__get_a_share_of_what_is_left_of_the_budget() -> None:
-    game, asked = simulator("blobs"), []
-
-    class Spy(Agent):
-        def act(self, simulator: Simulator, state: State) -> Decision:
-            return Decision(STOP)
-
-        def solve(self, simulator: Simulator, budget: Budget | None = None, on_progress: Any = None) -> Solution:
-            asked.append(budget)
-            return make_agent("trace").solve(simulator, budget, on_progress)
-
+    game = simulator("blobs")
+    asked: list[Budget | None] = []
     n_initial = 2
     n_traced = make_agent("trace").solve(game, Budget(refits=59)).stats.n_refits
-    MctsAgent(MctsConfig(), [Spy(), Spy()]).solve(game, Budget(refits=100))
+    MctsAgent(MctsConfig(), [Spy(asked), Spy(asked)]).solve(game, Budget(refits=100))
     rest = 100 - n_initial
     assert asked == [Budget(refits=round(SHARE * rest)), Budget(refits=round(SHARE * (rest - n_traced)))]
+
+
+def test_seeds__run_to_their_end_where_no_budget_is_given() -> None:
+    asked: list[Budget | None] = []
+    MctsAgent(MctsConfig(n_refits=10, hop_patience=0), [Spy(asked), Spy(asked)]).solve(simulator("blobs"))
+    assert asked == [Budget(), Budget()]
 
 
 def test_target__that_the_rectangle_matches_already_leaves_nothing_to_search() -> None:
