@@ -36,6 +36,13 @@ class Regularity:
     vertices: tuple[int, ...]
     off: float  # how far it is from being met, in the unit square
 
+    def has_sides(self, points: FloatArray) -> bool:
+        """Whether the edges that it is about have a length."""
+        if self.kind in ("x", "y"):
+            return True
+        a, b, c, d = self.vertices
+        return bool((points[a] != points[b]).any() and (points[c] != points[d]).any())
+
     def residual(self, points: FloatArray) -> tuple[float, FloatArray]:
         """(what is missing, its derivatives by `points` (V, 2))."""
         slope = np.zeros_like(points)
@@ -178,6 +185,8 @@ class _Frame:
     def _met(self, points: FloatArray, wanted: Sequence[Regularity]) -> FloatArray | None:
         """The places (V, 2) nearest to `points` that meet the equations; None where none are near the start."""
         for _ in range(_N_NEWTON):
+            if not all(regularity.has_sides(points) for regularity in wanted):
+                return None
             rows = self._equations(wanted, points)
             missing, slopes = np.array([m for m, _ in rows]), np.array([slope for _, slope in rows])
             if np.abs(missing).max() <= _EXACT:

@@ -37,6 +37,8 @@ def clean(mask: BoolArray, options: ObjectOptions) -> tuple[BoolArray, list[str]
         else:
             mask, n_parts = mask & ~specks, n_parts - n_specks
             notes.append(f"{counted(n_specks, 'speck')} of less than {least} pixels dropped")
+    elif n_specks and options.min_speck is not None:
+        notes.append(f"every part has less than {least} pixels and is kept: give a lower --min-speck")
     labels, enclosed = holes(mask)
     pinholes, n_pinholes = _smaller_than(least, labels, enclosed)
     n_holes = len(enclosed) - n_pinholes
@@ -53,7 +55,8 @@ def clean(mask: BoolArray, options: ObjectOptions) -> tuple[BoolArray, list[str]
         shown = square(mask)[0].astype(np.float64)
         n_parts, n_holes = int(label_parts(shown).max()), int(label_holes(shown).max())
     if n_parts > 1:
-        notes.append(f"object has {n_parts} separate parts{_word_on_dust(mask, least) if n_parts > SOME else ''}")
+        dust = _word_on_dust(mask, least) if n_parts > SOME and options.min_speck is None else ""
+        notes.append(f"object has {n_parts} separate parts{dust}")
     if n_holes:
         notes.append(f"object has {counted(n_holes, 'hole')}")
     if border(mask).any():

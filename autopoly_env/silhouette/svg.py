@@ -14,6 +14,7 @@ from autopoly_env.errors import ConfigError, SilhouetteError
 SIDE = 1024  # pixels of the longer side
 MAX_BYTES = 32_000_000  # of a drawing, unpacked
 EMBEDDED = re.compile(r"data:image/(png|jpe?g|gif|webp)[;,]", re.IGNORECASE)
+STYLESHEET = re.compile(rb"""<\?xml-stylesheet\b[^>]*?\bhref\s*=\s*["']([^"'#][^"']*)""")
 URL = re.compile(r"""url\(\s*["']?\s*([^"')]*)""", re.IGNORECASE)
 
 
@@ -31,7 +32,8 @@ def read(stream: IO[bytes], label: str) -> Image.Image | None:
     if len(data) > MAX_BYTES:
         raise SilhouetteError(f"{label} has more than {MAX_BYTES // 10**6} MB of SVG; expected less: simplify it")
     root = _parsed(data, label)
-    outside = next(_references(root), None)
+    sheet = STYLESHEET.search(data)
+    outside = next(_references(root), None) if sheet is None else sheet[1].decode("utf-8", "replace")
     if outside is not None:
         shown = outside if len(outside) <= 60 else f"{outside[:57]}..."
         raise SilhouetteError(

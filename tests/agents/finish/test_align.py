@@ -6,10 +6,12 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.budget import Meter
+from agents.budget import Budget, Meter
 from agents.finish import finish
 from agents.finish.align import MOST_LOST, Regularity, aligned, regularities
+from agents.registry import make_agent
 from autopoly_env.mesh import PolyMesh
+from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator
 from tests.helpers.drawings import HOUSE, SQUARE, painted
 
@@ -70,6 +72,24 @@ def test_equal__has_the_derivatives_of_differences() -> None:
         shift[index] = 1e-6
         more, less = (regularity.residual(points + sign * shift)[0] for sign in (1.0, -1.0))
         assert slope[index] == pytest.approx((more - less) / 2e-6, abs=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["equal", "parallel"])
+def test_edges__without_a_length_are_equal_and_parallel_to_nothing(kind: str) -> None:
+    points = np.array([(0.0, 0.0), (0.5, 0.0), (0.2, 0.4), (0.2, 0.4)])
+    assert not Regularity(kind, (0, 1, 2, 3), 0.0).has_sides(points)
+    assert Regularity(kind, (0, 1, 1, 2), 0.0).has_sides(points)
+    assert Regularity("x", (2, 3), 0.0).has_sides(points)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("error")
+def test_aligned__gives_up_where_an_edge_would_vanish() -> None:
+    mask = np.zeros((32, 32), np.bool_)
+    mask[6:26, 6:26] = True
+    mask[12:20, 12:20] = False
+    game = Simulator(Silhouette(mask), operators="modeller", faces="quads", symmetry="auto", align=True)
+    assert make_agent("quads").solve(game, Budget(20)).score.iou > 0.999  # on the way are meshes with shorter edges
 
 
 def test_parallel__is_zero_exactly_where_the_cross_product_is() -> None:

@@ -254,6 +254,9 @@ def test_dust__is_told_apart_with_the_option_that_drops_it() -> None:
     silhouette = load_silhouette(picture)
     assert "object has 5 separate parts, 4 of at most 6 pixels: --min-speck 7 drops those" in silhouette.notes
     assert np.array_equal(load(picture, min_speck=7).mask, chair())
+    everything = load(picture, min_speck=10_000)
+    assert np.array_equal(everything.mask, silhouette.mask)
+    assert says(everything, "every part has less than 10000 pixels and is kept: give a lower --min-speck")
 
 
 def test_checkerboard__of_pixels_is_grey_up_to_its_border_and_one_of_blocks_is_parts() -> None:

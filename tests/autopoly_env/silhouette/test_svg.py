@@ -52,6 +52,12 @@ def test_svg__may_hold_pictures_within_and_links_for_readers() -> None:
         assert load_silhouette(drawing(body)).mask.sum() == pytest.approx(256 * 256, rel=0.02)
 
 
+def test_svg__that_asks_for_a_stylesheet_elsewhere_is_refused() -> None:
+    sheet = '<?xml-stylesheet type="text/css" href="https://example.org/a.css"?>'
+    with pytest.raises(SilhouetteError, match=r"refers to 'https://example.org/a.css', which is not followed"):
+        load_silhouette(io.BytesIO(f"{sheet}{HEAD}{SQUARE}</svg>".encode()))
+
+
 @pytest.mark.parametrize(
     "body",
     [
