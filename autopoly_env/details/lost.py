@@ -20,10 +20,13 @@ _FEW = 25  # pixels a side, from which on a single pixel is none
 
 @dataclass(frozen=True)
 class Details:
-    """What there is in a picture: a point (x, y) inside each of P parts and each of H holes."""
+    """What there is in a picture: points (x, y) inside each of P parts and each of H holes.
 
-    parts: FloatArray  # (P, 2) unit square
-    holes: FloatArray  # (H, 2)
+    They are where it is deepest and the middle of its longest row: a coarse mesh of it has one of them at least.
+    """
+
+    parts: FloatArray  # (P, 2, 2) unit square
+    holes: FloatArray  # (H, 2, 2)
 
     @classmethod
     def of(cls, silhouette: Silhouette) -> "Details":
@@ -34,8 +37,9 @@ class Details:
         """How many of the (parts, holes) the mesh has, each as a part or a hole of its own."""
         loops = [mesh.vertices[loop] for loop in mesh.topology.boundary_loops]
         areas = np.array([_signed_area(loop) for loop in loops])
-        parts, holes = (_innermost(points, loops, areas) for points in (self.parts, self.holes))
-        return len({k for k in parts if k >= 0 and areas[k] > 0.0}), len({k for k in holes if k >= 0 > areas[k]})
+        signs = np.append(np.sign(areas), 0.0)  # the last for no loop
+        parts, holes = (_innermost(points.reshape(-1, 2), loops, areas) for points in (self.parts, self.holes))
+        return _n_loops(parts, signs[parts] > 0.0), _n_loops(holes, signs[holes] < 0.0)
 
 
 @dataclass(frozen=True)
@@ -58,11 +62,32 @@ class Losses:
 @lru_cache(maxsize=64)
 def _details_of(silhouette: Silhouette) -> Details:
     shown = silhouette.target(min(silhouette.resolution, FINEST)).coverage
-    return Details(_middles(label_parts(shown)), _middles(label_holes(shown)))
+    return Details(_points(label_parts(shown)), _points(label_holes(shown)))
+
+
+def _n_loops(loops: IntArray, is_own: BoolArray) -> int:
+    """How many different loops are the own ones of something, whose points have `loops` (N, 2) around them."""
+    pairs = zip(loops.reshape(-1, 2).tolist(), is_own.reshape(-1, 2).tolist(), strict=True)
+    return len({loop[is_fit.index(True)] for loop, is_fit in pairs if any(is_fit)})
+
+
+def _points(labels: IntArray) -> FloatArray:
+    """(N, 2, 2) for each label 1.. of a picture (R, R) its deepest point and the middle of its longest row."""
+    return np.stack((_deepest(labels), _middles(labels)), axis=1)
+
+
+def _deepest(labels: IntArray) -> FloatArray:
+    from scipy.ndimage import distance_transform_edt
+
+    depth = distance_transform_edt(np.pad(labels, 1) > 0)[1:-1, 1:-1]
+    order = np.lexsort((-depth.ravel(), labels.ravel()))
+    names = labels.ravel()[order]
+    rows, columns = np.divmod(order[np.flatnonzero(np.diff(names, prepend=0))], len(labels))
+    found: FloatArray = np.column_stack((columns + 0.5, rows + 0.5)) / len(labels)
+    return found
 
 
 def _middles(labels: IntArray) -> FloatArray:
-    """For each label 1.. of a picture (R, R) the middle of its longest stretch along a row."""
     size = len(labels)
     begins = np.flatnonzero(np.diff(labels, axis=1, prepend=-1).ravel())  # every row begins anew
     lengths, names = np.diff(begins, append=size * size), labels.ravel()[begins]

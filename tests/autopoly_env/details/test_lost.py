@@ -25,12 +25,12 @@ def framed(x0: float, y0: float, x1: float, y1: float) -> PolyMesh:
     return PolyMesh.from_faces(np.array(outer + hole), [(0, 1, 2, 6, 5, 4), (2, 3, 0, 4, 7, 6)])
 
 
-def test_details__have_a_point_in_every_part_and_hole() -> None:
+def test_details__have_points_in_every_part_and_hole() -> None:
     silhouette = painted(shapely.union_all([TWO_HOLES, shapely.box(0.27, 0.27, 0.33, 0.33)]), SIZE)
     details = Details.of(silhouette)
     assert (len(details.parts), len(details.holes)) == (2, 2)
     for points, value in ((details.parts, True), (details.holes, False)):
-        columns, rows = np.floor(points * SIZE).astype(int).T
+        columns, rows = np.floor(points.reshape(-1, 2) * SIZE).astype(int).T
         assert (silhouette.mask[rows, columns] == value).all()
     assert Details.of(silhouette) is details
 
@@ -55,6 +55,13 @@ def test_losses__count_places_that_differ_by_more_than_a_seam() -> None:
     comb = painted(shapely.union_all([back, *teeth]), 256)
     assert Losses.of(boxes((0.125, 0.5, 0.875, 0.875)), comb) == Losses(1, 0, 1, 0, 6)
     assert Losses.of(boxes((0.12, 0.5, 0.88, 0.875)), painted(back, 256)) == Losses(1, 0, 1, 0, 0)
+
+
+def test_kept__is_a_part_whose_outline_is_coarse_where_the_part_is_widest() -> None:
+    heart = shapely.Polygon([(0.1, 0.3), (0.3, 0.1), (0.45, 0.29), (0.55, 0.29), (0.7, 0.1), (0.9, 0.3), (0.5, 0.9)])
+    points = np.array([(0.1, 0.3), (0.3, 0.1), (0.5, 0.36), (0.7, 0.1), (0.9, 0.3), (0.5, 0.9)])
+    notched = PolyMesh.from_faces(points, [(0, 1, 2, 5), (2, 3, 4, 5)])  # deeper than the widest row is high
+    assert Details.of(painted(heart, SIZE)).kept(notched) == (1, 0)
 
 
 def test_losses__count_no_slivers_that_a_coarse_outline_leaves_of_a_curve() -> None:
