@@ -14,6 +14,7 @@ from autopoly_env.simulator import Simulator
 _PRICES = (0.3, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002)  # of an element, that are tried for a mesh that loses nothing
 _FEW_PLACES = 4  # places where mesh and picture differ that are not worth a word
 _SEEN = 0.95  # IoU, about, of an outline that has the small details
+_SEEN_AS_AREA = 0.85  # the same, where exact areas are compared: no outline has been refitted yet
 _STEPS = (1000, 10_000)
 _FEW_RINGS = 10  # parts and holes that a wish keeps in quads, as far as was tried
 
@@ -69,13 +70,14 @@ def _price_that_keeps(simulator: Simulator, rings_lost: bool, details_lost: bool
     rings = trace_rings(simulator.silhouette)
     details = Details.of(simulator.silhouette)
     everything = len(details.parts), len(details.holes)
+    seen = _SEEN_AS_AREA if simulator.silhouette.is_scored_by_area else _SEEN
     for price in _PRICES:
         if price > simulator.weights.w_sc or (price == simulator.weights.w_sc and not options):
             continue
         outline = _traced(simulator, price)
         if outline is None or (rings_lost and details.kept(outline.loops) != everything):
             continue
-        if details_lost and outline.score(simulator.silhouette.target(simulator.finest), ScoreWeights()).iou < _SEEN:
+        if details_lost and outline.score(simulator.silhouette.target(simulator.finest), ScoreWeights()).iou < seen:
             continue
         steps = next((n for n in (simulator.max_steps, *_STEPS) if n >= outline.n_steps), None)
         if steps is None or not rings:

@@ -6,7 +6,16 @@ from autopoly_env.arrays import BoolArray, Float32Array
 from autopoly_env.errors import SilhouetteError
 from autopoly_env.silhouette.background import Background, find_background
 from autopoly_env.silhouette.colours import hex_of, oklab, parse_colour
-from autopoly_env.silhouette.difference import FAINT, SPRITE, STUDIED, beyond_cut, choose_cut, filled, paler_share
+from autopoly_env.silhouette.difference import (
+    FAINT,
+    SPRITE,
+    STUDIED,
+    beyond_cut,
+    choose_cut,
+    filled,
+    is_grainy,
+    paler_share,
+)
 from autopoly_env.silhouette.opinion import Opinion, View
 from autopoly_env.silhouette.options import ObjectOptions
 
@@ -52,6 +61,8 @@ def opinion(view: View) -> Opinion | None:
 
 def _doubts_on_pale_parts(mask: BoolArray, distances: Float32Array, level: float, name: str) -> list[str]:
     """A word where a lower cut would find much more: in a small picture that was compressed nobody can tell."""
+    if is_grainy(mask, distances):
+        return []
     for lower, most in PALER.items():
         share = paler_share(mask, distances, lower) if lower < level else 0.0
         if share > most:

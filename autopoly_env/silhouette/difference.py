@@ -12,6 +12,7 @@ USUAL = 0.07  # from here on something is there, if nothing speaks against it
 FAINT = 0.03  # what lossy compression leaves beside edges is less, mostly
 EXACT = 0.004  # a flat background with no more noise is a drawing's: whatever differs from it at all is there
 DUST = 3  # more parts at the lowest cut than at the usual one: it is no drawing, but a JPEG of one
+GRAINS = 80  # more parts beside the object at a faint cut: they are the picture's grain, and none is pale
 PALE = 0.35  # of the strongest difference: a paler object has a lower cut
 STUDIED = 256  # pixels a side, about: the cut is chosen on so many
 STEP = 1.35  # between cuts that are tried
@@ -131,6 +132,13 @@ def paler_share(mask: BoolArray, distances: Float32Array, level: float) -> float
     """How much larger a mask (H, W) and its holes are with all that lies beyond a lower cut: pale parts, or traces."""
     size = int(np.count_nonzero(filled(mask)))
     return int(np.count_nonzero(filled(mask | (distances > level)))) / max(1, size) - 1.0
+
+
+def is_grainy(mask: BoolArray, distances: Float32Array) -> bool:
+    """Whether a cut at FAINT finds grain all over a picture (H, W), apart from the mask."""
+    from skimage.measure import label
+
+    return int(label((distances > FAINT) & ~mask, connectivity=2, return_num=True)[1]) > GRAINS
 
 
 def _outermost(mask: BoolArray) -> BoolArray:

@@ -241,6 +241,12 @@ def test_small_jpeg__without_pale_parts_asks_nothing(quality: int) -> None:
     assert not says(silhouette, "--")
 
 
+def test_grain__is_no_pale_part() -> None:
+    noise = np.random.default_rng(0).normal(0.0, 12.0, (SIZE, SIZE))
+    grainy = np.clip(np.where(chair(), 60.0, 200.0) + noise, 0, 255).astype(np.uint8)
+    assert not says(load_silhouette(grainy), "differs a little")
+
+
 def test_colour__that_finds_nothing_says_so() -> None:
     halves = np.where(np.arange(32) < 16, 200, 184) + np.random.default_rng(0).integers(-3, 4, (32, 32))
     assert says(load_silhouette(halves.astype(np.uint8)), "colour finds none that stands out from the border")
