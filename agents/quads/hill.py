@@ -102,7 +102,8 @@ class QuadHill:
         if place.partition is not None:
             found += quad_neighbours(place.outline, place.partition, silhouette, n_blamed)
         if self.axis is not None:
-            found = list(symmetric_neighbours(found, place.outline, self.axis))
+            halves = symmetric_neighbours(found, place.outline, self.axis)
+            found = [half for half in halves if self.simulator.guidance.is_symmetric(half.loops)]
         ious = [self._iou(outline) for outline in found]
         likely = _best_first(list(map(self._promise, found, ious)))[:_N_LIKELY]
         places = map_threads(lambda k: self.place(found[k], ious[k]), likely)

@@ -83,3 +83,10 @@ def test_agent__builds_left_and_right_alike_under_the_rule(shape: shapely.Geomet
     assert images_of(solution.mesh, 0.5) is not None and broken_faces(solution.mesh, "quads") == []
     assert solution.score.iou > 0.93 and len(solution.sequence.steps) > 0
     assert solution.sequence.final() == solution.mesh
+
+
+@pytest.mark.slow
+def test_agent__meets_no_outline_that_lies_doubled_in_one_place() -> None:
+    bars = painted(shapely.box(10 / 64, 0.125, 24 / 64, 0.875) | shapely.box(40 / 64, 0.125, 54 / 64, 0.875), 64)
+    game = Simulator(bars, operators="modeller", faces="quads", symmetry=0.5)
+    assert make_agent("quads").solve(game).score.total == pytest.approx(100.0 - 0.3 * 18)
