@@ -425,12 +425,29 @@ class Simulator:
         return best
 
     def polish(self, mesh: PolyMesh) -> PolyMesh:
-        """The mesh refined, then tuned at the same resolution, unless it has many vertices: no worse than it was."""
+        """The mesh refined, then tuned at the same resolution, unless it has many vertices: no worse than it was.
+
+        What has come to lie beyond the border of the picture, where nothing is compared, is put back on it.
+        """
         refined = self.refine(mesh)
         if len(mesh.vertices) > MANY_VERTICES:
-            return refined
+            return self._within(refined)
         tuned = tune(refined, self.silhouette.target(self.finest), self.guidance.bonds(mesh), self.faces)
-        return max((refined, tuned), key=self.worth)
+        return self._within(max((refined, tuned), key=self.worth))
+
+    def _within(self, mesh: PolyMesh) -> PolyMesh:
+        """The mesh without vertices outside of the unit square: all of them on its border, or those that may be."""
+        inside = np.clip(mesh.vertices, 0.0, 1.0)
+        outside = np.flatnonzero((inside != mesh.vertices).any(axis=1))
+        outside = outside[[mesh.vertex_ids[k] not in self.guidance.locked for k in outside.tolist()]]
+        for rows in (outside, *outside.reshape(-1, 1)) if len(outside) else ():
+            points = mesh.vertices.copy()
+            points[rows] = inside[rows]
+            moved = mesh.with_vertices(points)
+            is_fit = self.is_sane(moved) and self.guidance.is_symmetric(moved)
+            if is_fit and self.worth(moved) >= self.worth(mesh):
+                mesh = moved
+        return mesh
 
 
 def _is_as_sane(after: State, before: Disagreement) -> bool:

@@ -454,6 +454,21 @@ def test_refit_target__makes_the_iou_larger_than_least_squares_do() -> None:
     assert aimed.face_areas().sum() > plain.face_areas().sum()  # more of the disc for a little more of the outside
 
 
+@pytest.mark.parametrize("symmetry", [None, 0.5])
+def test_polish__puts_back_on_the_border_what_lies_beyond_it(symmetry: float | None) -> None:
+    game = Simulator(painted(shapely.box(0.25, 0.0, 0.75, 0.5)), resolution=64, symmetry=symmetry)
+    polished = game.polish(PolyMesh.rectangle(0.25, -0.1, 0.75, 0.5))
+    assert polished.vertices[:, 1].min() == 0.0
+    assert game.final_score(polished).iou == 1.0
+
+
+def test_polish__leaves_beyond_the_border_what_is_worth_more_there() -> None:
+    cut = shapely.Polygon([(0.5, -0.25), (1.0, 0.5), (0.5, 0.9), (0.0, 0.5)]).intersection(shapely.box(0, 0, 1, 1))
+    game = Simulator(painted(cut), resolution=64)
+    polished = game.polish(PolyMesh.from_faces([(0.5, -0.25), (0.0, 0.5), (0.5, 0.9), (1.0, 0.5)], [(0, 3, 2, 1)]))
+    assert polished.vertices[:, 1].min() < -0.1 and game.final_score(polished).iou > 0.99
+
+
 def test_polish__is_never_worse_at_the_silhouettes_own_resolution() -> None:
     game = Simulator(disc(), resolution=32)
     for n in (3, 5, 8):
