@@ -13,12 +13,13 @@ import numpy as np
 import shapely
 
 from autopoly_env.arguments import number, whole
-from autopoly_env.arrays import BoolArray
+from autopoly_env.arrays import BoolArray, FloatArray
 from autopoly_env.compute import Job, Routine, map_threads, run
 from autopoly_env.details import Details, hairlines
 from autopoly_env.errors import ConfigError, IllegalActionError, MeshError
 from autopoly_env.guidance import MOST_CORNERS, Guidance, ImportanceSource, importance_settings, weighted
 from autopoly_env.mesh import FaceRule, PolyMesh, broken_faces, check_faces, defects_of, face_rule
+from autopoly_env.mesh.symmetry import mirrored
 from autopoly_env.operators import STOP, Action, Choice, Halfway, Operator, Start, describe, legal_actions, preset
 from autopoly_env.placement import Disagreement, Trial, tried
 from autopoly_env.refit import FROM_AFAR, LOCAL, THOROUGH, RefitConfig, RefitTarget, holding, mended, refit, tune
@@ -436,18 +437,37 @@ class Simulator:
         return self._within(max((refined, tuned), key=self.worth))
 
     def _within(self, mesh: PolyMesh) -> PolyMesh:
-        """The mesh without vertices outside of the unit square: all of them on its border, or those that may be."""
-        inside = np.clip(mesh.vertices, 0.0, 1.0)
-        outside = np.flatnonzero((inside != mesh.vertices).any(axis=1))
-        outside = outside[[mesh.vertex_ids[k] not in self.guidance.locked for k in outside.tolist()]]
-        for rows in (outside, *outside.reshape(-1, 1)) if len(outside) else ():
-            points = mesh.vertices.copy()
-            points[rows] = inside[rows]
-            moved = mesh.with_vertices(points)
-            is_fit = self.is_sane(moved) and self.guidance.is_symmetric(moved)
-            if is_fit and self.worth(moved) >= self.worth(mesh):
-                mesh = moved
+        """The mesh with vertices outside of the unit square moved to its border, one after the other, at no loss.
+
+        Along an edge nothing changes that can be seen.
+        """
+        bonds = self.guidance.bonds(mesh)
+        outside = np.flatnonzero(((mesh.vertices < 0.0) | (mesh.vertices > 1.0)).any(axis=1)).tolist()
+        for vertex in (k for k in outside if bonds is None or not bonds.locked[k]):
+            for place in _places_on_border(mesh, vertex):
+                points = mesh.vertices.copy()
+                points[vertex] = place
+                if bonds is not None and bonds.images[vertex] >= 0:
+                    points[bonds.images[vertex]] = mirrored(place, bonds.axis)
+                moved = mesh.with_vertices(points)
+                is_fit = self.is_sane(moved) and self.guidance.is_symmetric(moved)
+                if is_fit and self.worth(moved) >= self.worth(mesh):
+                    mesh = moved
+                    break
         return mesh
+
+
+def _places_on_border(mesh: PolyMesh, vertex: int) -> Iterator[FloatArray]:
+    """Where the edges of a vertex outside of the unit square cross its border, and the nearest place on it."""
+    beyond = mesh.vertices[vertex]
+    inside = np.clip(beyond, 0.0, 1.0)
+    for pair in mesh.edges[(mesh.edges == vertex).any(axis=1)].tolist():
+        end = mesh.vertices[pair[pair[0] == vertex]]
+        way = beyond - end
+        if (np.clip(end, 0.0, 1.0) == end).all():
+            share = np.divide(inside - end, way, out=np.ones(2), where=way != 0.0).min()
+            yield np.clip(end + share * way, 0.0, 1.0)
+    yield inside
 
 
 def _is_as_sane(after: State, before: Disagreement) -> bool:

@@ -462,6 +462,15 @@ def test_polish__puts_back_on_the_border_what_lies_beyond_it(symmetry: float | N
     assert game.final_score(polished).iou == 1.0
 
 
+def test_polish__goes_back_to_the_border_along_slanting_edges() -> None:
+    ramp = shapely.Polygon([(0.25, 0.75), (0.35, -0.25), (0.65, -0.25), (0.75, 0.75)])
+    game = Simulator(painted(ramp.intersection(shapely.box(0, 0, 1, 1)), 128), resolution=128, symmetry=0.5)
+    start = PolyMesh.from_faces([(0.25, 0.75), (0.35, -0.25), (0.65, -0.25), (0.75, 0.75)], [(0, 1, 2, 3)])
+    polished = game.polish(start)
+    assert polished.vertices[:, 1].min() == 0.0 and game.guidance.is_symmetric(polished)
+    assert np.abs(polished.vertices[1] - (0.325, 0.0)).max() < 0.005
+
+
 def test_polish__leaves_beyond_the_border_what_is_worth_more_there() -> None:
     cut = shapely.Polygon([(0.5, -0.25), (1.0, 0.5), (0.5, 0.9), (0.0, 0.5)]).intersection(shapely.box(0, 0, 1, 1))
     game = Simulator(painted(cut), resolution=64)
