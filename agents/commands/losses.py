@@ -13,6 +13,7 @@ from autopoly_env.simulator import Simulator
 
 _PRICES = (0.3, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002)  # of an element, that are tried for a mesh that loses nothing
 _FEW_PLACES = 4  # places where mesh and picture differ that are not worth a word
+_ROUGH = 0.7  # IoU, below which something is lost even where it is in one piece, such as the turns of a spiral
 _SEEN = 0.95  # IoU, about, of an outline that has the small details
 _SEEN_AS_AREA = 0.85  # the same, where exact areas are compared: no outline has been refitted yet
 _STEPS = (1000, 10_000)
@@ -24,8 +25,8 @@ def losses_of(solution: Solution, simulator: Simulator) -> Losses:
     return Losses.of(solution.mesh, simulator.silhouette)
 
 
-def in_words(losses: Losses, simulator: Simulator) -> str:
-    """What is lost, and what keeps it; empty if nothing is."""
+def in_words(losses: Losses, simulator: Simulator, iou: float = 1.0) -> str:
+    """What is lost, and what keeps it; empty if nothing is. `iou` is that of the mesh."""
     lost = [
         f"the picture has {n} {kind}{'s' if n > 1 else ''}, the mesh {n_kept or 'none'}"
         for kind, n, n_kept in (
@@ -38,6 +39,8 @@ def in_words(losses: Losses, simulator: Simulator) -> str:
     n_small = losses.n_places - n_lost
     if n_small >= _FEW_PLACES:
         lost.append(f"they differ in {n_small} small details" if lost else f"{n_small} small details are lost")
+    if not lost and iou < _ROUGH:
+        return f"most details are lost (IoU {iou:.2f}){_advice(losses, simulator, False, True)}"
     if not lost:
         return ""
     return f"{', and '.join(lost)}{_advice(losses, simulator, n_lost > 0, n_small >= _FEW_PLACES)}"

@@ -203,7 +203,7 @@ def _solve(job: Job, settings: Settings, out: Path, report: Report, ctrl_c: Ctrl
     with ctrl_c.searching():
         solution = solved(agent, simulator, settings.budget, ctrl_c.heeding(report.progress))
     losses = losses_of(solution, simulator)
-    lost = in_words(losses, simulator)
+    lost = in_words(losses, simulator, solution.score.iou)
     own = {**settings.as_dict(), **({"lost": lost} if lost else {})}
     sequence = solution.sequence
     sequence = replace(sequence, settings={**sequence.settings, **own})

@@ -74,6 +74,18 @@ def test_losses__in_quads_are_told_with_the_wish_that_keeps_them_or_the_other_st
     )
 
 
+def test_losses__in_one_piece_are_told_by_the_iou() -> None:
+    rows, columns = np.indices((128, 128)) - 64
+    turns = np.hypot(rows, columns) / 6 - np.arctan2(rows, columns) / (2 * np.pi)
+    game = Simulator(Silhouette((turns % 1 < 0.5) & (turns < 9)))
+    octagon = PolyMesh.from_faces(
+        0.5 + 0.4 * np.array([(np.cos(a), np.sin(a)) for a in np.arange(8) * np.pi / 4]), [tuple(range(8))]
+    )
+    losses, iou = Losses.of(octagon, game.silhouette), game.final_score(octagon).iou
+    assert iou < 0.6 and in_words(losses, game, 0.75) == ""
+    assert in_words(losses, game, iou).startswith(f"most details are lost (IoU {iou:.2f}): --w-sc 0.")
+
+
 @pytest.mark.slow
 def test_losses__in_quads_are_kept_by_the_wish_that_is_told() -> None:
     game = Simulator(plate_with_holes(), operators="modeller", faces="quads", keep="holes")
