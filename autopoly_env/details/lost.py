@@ -62,7 +62,20 @@ class Losses:
 @lru_cache(maxsize=64)
 def _details_of(silhouette: Silhouette) -> Details:
     shown = silhouette.target(min(silhouette.resolution, FINEST)).coverage
-    return Details(_points(label_parts(shown)), _points(label_holes(shown)))
+    parts = _points(label_parts(shown))
+    if silhouette.resolution > FINEST:
+        parts = _of_different_parts(parts, silhouette.mask)
+    return Details(parts, _points(label_holes(shown)))
+
+
+def _of_different_parts(points: FloatArray, mask: BoolArray) -> FloatArray:
+    """Those (N, 2, 2) in parts of their own in the full picture: what joins them may be too thin at FINEST."""
+    from skimage.measure import label
+
+    labels, cell = label(mask, connectivity=2), -(-len(mask) // FINEST)
+    corners = np.maximum((points[:, 0] * len(mask)).astype(np.int64) - cell // 2, 0)
+    names = [int(labels[y : y + cell, x : x + cell].max()) for x, y in corners.tolist()]
+    return points[[k for k, name in enumerate(names) if not name or name not in names[:k]]]
 
 
 def _n_loops(loops: IntArray, is_own: BoolArray) -> int:

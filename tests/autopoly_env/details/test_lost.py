@@ -64,6 +64,14 @@ def test_kept__is_a_part_whose_outline_is_coarse_where_the_part_is_widest() -> N
     assert Details.of(painted(heart, SIZE)).kept(notched) == (1, 0)
 
 
+def test_parts__that_a_line_joins_which_is_thin_in_a_large_picture_are_one() -> None:
+    mask = np.zeros((1024, 1024), np.bool_)
+    mask[500:524, 100:300] = mask[500:524, 600:900] = True
+    assert len(Details.of(Silhouette(mask)).parts) == 2
+    mask[511:512, 300:600] = True
+    assert len(Details.of(Silhouette(mask)).parts) == 1
+
+
 def test_losses__count_no_slivers_that_a_coarse_outline_leaves_of_a_curve() -> None:
     disc = shapely.Point(0.5, 0.5).buffer(0.35)
     angles = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
