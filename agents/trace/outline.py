@@ -117,8 +117,10 @@ def nested(loops: Sequence[FloatArray]) -> Outline | None:
     holes = [loop for loop in loops if signed_area(loop) < 0.0]
     polygons = [shapely.Polygon(loop) for loop in outer if holes]
     for hole in holes:
-        middle = shapely.Polygon(hole).representative_point() if shapely.Polygon(hole).is_valid else None
-        inside = [k for k, polygon in enumerate(polygons) if middle is not None and polygon.contains(middle)]
+        within = shapely.Polygon(hole)
+        middle = within.representative_point() if within.is_valid else None
+        around = [k for k, polygon in enumerate(polygons) if polygon.area > within.area]  # no island in the hole
+        inside = [k for k in around if middle is not None and polygons[k].contains(middle)]
         if not inside:
             return None
         rings.append(Ring(hole, inside[-1]))

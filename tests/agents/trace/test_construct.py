@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from agents.trace.construct import UnbuildableError, construct
-from agents.trace.outline import Outline, outline_of_mesh
+from agents.trace.outline import Outline, nested, outline_of_mesh
 from agents.trace.peel_kernels import peel
 from agents.trace.rings import Ring
 from autopoly_env.arrays import FloatArray
@@ -207,3 +207,16 @@ def test_construct__leaves_out_the_holes_of_a_part_that_is_left_out() -> None:
 def test_construct__refuses_a_main_ring_that_is_not_sane(main: FloatArray) -> None:
     with pytest.raises(UnbuildableError):
         construct(GAME, [Ring(main, -1)])
+
+
+def test_nested__finds_a_hole_in_the_part_around_it_and_not_in_its_island() -> None:
+    def square(half: float) -> np.ndarray:
+        return 0.5 + half * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+
+    rings = [square(half) for half in (0.1, 0.4, 0.2)], [square(half)[::-1] for half in (0.3, 0.15)]
+    loops = [loop for group in rings for loop in group]
+    outline = nested(loops)
+    assert outline is not None
+    sizes = [round(float(np.ptp(ring.points)), 3) for ring in outline.rings]
+    assert sizes == [0.8, 0.4, 0.2, 0.6, 0.3]
+    assert [ring.parent for ring in outline.rings] == [-1, -1, -1, 0, 1]
