@@ -85,8 +85,9 @@ def _price_that_keeps(simulator: Simulator, rings_lost: bool, details_lost: bool
         steps = next((n for n in (simulator.max_steps, *_STEPS) if n >= outline.n_steps), None)
         if steps is None or not rings:
             break
+        dear = "" if price == simulator.weights.w_sc else f" --w-sc {price:g}"
         more = "" if steps == simulator.max_steps else f" --max-steps {steps}"
-        return f":{options} --w-sc {price:g}{more} keeps them (about {outline.complexity} elements)"
+        return f":{options}{dear}{more} keeps them (about {outline.complexity} elements)"
     return ""
 
 
