@@ -441,8 +441,8 @@ class Simulator:
 
         Along an edge nothing changes that can be seen.
         """
-        bonds = self.guidance.bonds(mesh)
         outside = np.flatnonzero(((mesh.vertices < 0.0) | (mesh.vertices > 1.0)).any(axis=1)).tolist()
+        bonds = self.guidance.bonds(mesh) if outside else None
         for vertex in (k for k in outside if bonds is None or not bonds.locked[k]):
             for place in _places_on_border(mesh, vertex):
                 points = mesh.vertices.copy()
