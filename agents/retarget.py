@@ -27,6 +27,7 @@ HELP = """Tell the steps of a construction again for another silhouette, and men
 Examples:
   python -m agents.retarget out/chair/sequence.json other_chair.png
   python -m agents.retarget out/mug/sequence.json jug.png --refits 1000 --out jugs
+  python -m agents.retarget out/chair/sequence.json other_chair.png --keep-level
 
 \b
 OUT/<name of the image without its ending>/ gets what agents.solve writes: sequence.json,
@@ -51,6 +52,10 @@ def retarget(
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out"),
     operators: OutsideOperators = None,
     faces: FaceRuleOfSequence = None,
+    keep_level: Annotated[bool, typer.Option("--keep-level", help="Level and plumb edges stay so.")] = False,
+    no_symmetry: Annotated[
+        bool, typer.Option("--no-symmetry", help="Let left and right differ where old and new are alike.")
+    ] = False,
     object_: pictures.Object = "auto",
     background: pictures.Background = None,
     threshold: pictures.Threshold = None,
@@ -67,6 +72,7 @@ def retarget(
     from agents.commands.report import Report
     from agents.commands.results import Result, claim_folder, write_results
     from agents.commands.solving import name_jobs
+    from agents.retell.frame import axis_of
     from agents.retell.retargeting import retarget as work
     from autopoly_env.sequence import ConstructionSequence
     from autopoly_env.silhouette import load_silhouette
@@ -77,14 +83,15 @@ def retarget(
     sequence = _under(source, ConstructionSequence.load(source), faces)
     [job] = name_jobs([image], out)
     silhouette = load_silhouette(image, name=job.name, options=picture)
-    simulator = _simulator(source, sequence, silhouette)
+    is_alike = not no_symmetry and axis_of(sequence.final()) is not None
+    simulator = _simulator(source, sequence, silhouette, "auto" if is_alike else None)
     _check_not_overwritten(source, out / job.name)
     claim_folder(out)
     with CtrlC() as ctrl_c, Report(1, quiet=quiet or as_json) as report:
         report.begin(job.name)
         try:
             with ctrl_c.searching():
-                done = work(simulator, sequence, budget, ctrl_c.heeding(report.progress))
+                done = work(simulator, sequence, budget, ctrl_c.heeding(report.progress), keep_level=keep_level)
             told = replace(done.solution.sequence, settings={**done.solution.sequence.settings, **_notes_of(done)})
             solution = replace(done.solution, sequence=told)
             files = write_results(out / job.name, solution, silhouette, ctrl_c.shielded, with_mask=show_mask)
@@ -95,7 +102,7 @@ def retarget(
         else:
             report.solved(Result(image, job.name, solution, silhouette.notes, files))
             report.finish(None)
-            print(_words(done, len(sequence.steps)))
+            print(_words(done, len(sequence.steps), simulator.guidance.axis, keep_level=keep_level))
         return INTERRUPTED if ctrl_c.n_pressed else 0
 
 
@@ -112,7 +119,9 @@ def _under(source: Path, sequence: "ConstructionSequence", faces: str | None) ->
         raise SequenceError(f"{source}: {error}") from None
 
 
-def _simulator(source: Path, sequence: "ConstructionSequence", silhouette: "Silhouette") -> "Simulator":
+def _simulator(
+    source: Path, sequence: "ConstructionSequence", silhouette: "Silhouette", symmetry: str | None
+) -> "Simulator":
     """The rules that the sequence was made under, as far as it tells them. Raises SequenceError for unknown ones."""
     from autopoly_env.sequence.variation import weights_of
     from autopoly_env.simulator import Simulator
@@ -126,6 +135,7 @@ def _simulator(source: Path, sequence: "ConstructionSequence", silhouette: "Silh
             weights=weights_of(sequence.settings),
             max_steps=max(100, len(sequence.steps)),
             faces=sequence.faces,
+            symmetry=symmetry,
         )
     except ConfigError as error:
         raise SequenceError(f"{source}: settings: {error}") from None
@@ -149,11 +159,13 @@ def _record(done: "Retargeted") -> dict[str, Any]:
         "after": asdict(done.solution.score),
         "start_iou": done.start_iou,
         "begins_elsewhere": done.begins_elsewhere,
+        "level": done.n_level,
+        "tilted": done.n_tilted,
         "n_refits": done.solution.stats.n_refits,
     }
 
 
-def _words(done: "Retargeted", n_steps: int) -> str:
+def _words(done: "Retargeted", n_steps: int, axis: float | None = None, *, keep_level: bool = False) -> str:
     totals = (
         f"{done.before.total:.2f} as it was, {done.refitted.total:.2f} refitted, {done.solution.score.total:.2f} now"
     )
@@ -163,7 +175,12 @@ def _words(done: "Retargeted", n_steps: int) -> str:
             f"; kept in name only: the start is a detail here (IoU {done.start_iou:.3f}), no body as it was "
             f"(at least {done.least_start_iou:.2f}); give a construction of a more similar shape, or solve it afresh"
         )
-    return f"{steps}\nr_all: {totals}"
+    lines = [steps, f"r_all: {totals}"]
+    if axis is not None:
+        lines.append(f"left and right stay alike (about x = {axis:g})")
+    if keep_level:
+        lines.append(f"level and plumb: {done.n_level} of {done.n_level + done.n_tilted} edges stay so")
+    return "\n".join(lines)
 
 
 if __name__ == "__main__":

@@ -29,11 +29,13 @@ HELP = """Make variants of a construction: an early step is edited, the later on
 Examples:
   python -m agents.vary out/chair/sequence.json
   python -m agents.vary out/chair/sequence.json --n 20 --amount 0.2 --seed 1 --out chairs
+  python -m agents.vary out/chair/sequence.json --keep-level
 
 \b
 OUT/variants.png shows all of them, the given mesh first. OUT/variant-1/, OUT/variant-2/, ...
 get what agents.solve writes: sequence.json, mesh.obj, steps.png, player.html and others.
-No mesh on the way crosses itself or has a flipped face (docs/variations.md).
+No mesh on the way crosses itself or has a flipped face; a symmetric outline stays symmetric
+(docs/variations.md).
 
 Exit codes: 0 all is well, 1 something failed, 2 wrong usage, 130 Ctrl-C.
 """
@@ -48,6 +50,10 @@ def vary(
     amount: Annotated[float, typer.Option(help="How far an edit pulls, in the unit square.")] = 0.12,
     seed: Annotated[int, typer.Option(help="Of the random numbers.")] = 0,
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/variants"),
+    keep_level: Annotated[bool, typer.Option("--keep-level", help="Level and plumb edges stay so.")] = False,
+    no_symmetry: Annotated[
+        bool, typer.Option("--no-symmetry", help="Let left and right differ where they are alike.")
+    ] = False,
     operators: OutsideOperators = None,
     faces: FaceRuleOfSequence = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar, no notes.")] = False,
@@ -68,9 +74,10 @@ def vary(
     except SequenceError as error:
         raise SequenceError(f"{source}: {error}") from None
     claim_folder(out)
+    variants = draw_variants(sequence, n, amount, seed, keep_level=keep_level, keep_symmetry=not no_symmetry)
     cells, n_failed = [_cell(sequence.final(), "as it was\n")], 0
     with CtrlC() as ctrl_c, progress_bar(n, "variants", is_hidden=quiet) as bar:
-        for number, variant in enumerate(draw_variants(sequence, n, amount, seed), 1):
+        for number, variant in enumerate(variants, 1):
             if variant is None:
                 n_failed += 1
             else:

@@ -21,6 +21,7 @@ NEAR_LENGTH = 0.05  # share of their length by which two edges of nearly equal l
 NEAR_PLACE = 0.006  # distance (unit square) within which two lines are nearly one
 _MOST_MOVED = 0.012  # unit square, by any vertex
 _N_NEWTON = 12
+_N_FITS = 20
 _EXACT = 1e-11
 _DEPENDENT = 1e-3  # singular value beside the largest, below which equations say the same
 _LEAST_WAY = 0.05  # of a coordinate, that is left to it by what has been imposed
@@ -65,11 +66,16 @@ class Regularity:
         return float(missing), slope
 
 
-def aligned(simulator: Simulator, mesh: PolyMesh) -> PolyMesh:
-    """The mesh made regular where it nearly is; itself where nothing can be done, or it has many vertices."""
+def aligned(simulator: Simulator, mesh: PolyMesh, wanted: Sequence[Regularity] = ()) -> PolyMesh:
+    """The mesh made regular where it nearly is; itself where nothing can be done, or it has many vertices.
+
+    What is `wanted` is imposed first, whatever it costs of the IoU, as long as no defect comes of it.
+    """
     if len(mesh.vertices) > MANY_VERTICES:
         return mesh
     frame = _Frame(simulator, mesh)
+    if wanted:
+        frame.insist(wanted)
     frame.impose(sorted(regularities(mesh), key=lambda regularity: regularity.off))
     return frame.fitted()
 
@@ -122,7 +128,7 @@ class _Frame:
     def __init__(self, simulator: Simulator, mesh: PolyMesh) -> None:
         self.mesh = mesh
         self._simulator, self._start = simulator, mesh
-        self._least_iou = simulator.final_score(mesh).iou - MOST_LOST
+        self._least_iou, self._most_moved = simulator.final_score(mesh).iou - MOST_LOST, _MOST_MOVED
         self._most_off = simulator.off(mesh)
         self._imposed: list[Regularity] = []
         bonds = simulator.guidance.bonds(mesh)
@@ -142,6 +148,18 @@ class _Frame:
             half = len(regularities) // 2
             self.impose(regularities[:half])
             self.impose(regularities[half:])
+
+    def insist(self, regularities: Sequence[Regularity]) -> None:
+        """All of them but those that would bring a defect; then as good a fit as they allow."""
+        self._least_iou, self._most_moved = 0.0, 1.0
+        self.impose(regularities)
+        for _ in range(_N_FITS):
+            before = self.mesh
+            self.mesh = self.fitted()
+            if self.mesh is before:
+                break
+        self._start = self.mesh
+        self._least_iou, self._most_moved = self._iou(self.mesh.vertices) - MOST_LOST, _MOST_MOVED
 
     def fitted(self) -> PolyMesh:
         """The mesh with vertices moved by fractions of a pixel while the IoU gains, as what was imposed lets them."""
@@ -194,7 +212,7 @@ class _Frame:
             slopes[:, self._locked] = 0.0
             step = np.linalg.lstsq(slopes.reshape(len(rows), -1), missing, rcond=_DEPENDENT)[0]
             points = points - step.reshape(-1, 2)
-            if np.abs(points - self._start.vertices).max() > _MOST_MOVED:
+            if np.abs(points - self._start.vertices).max() > self._most_moved:
                 return None
         return None
 

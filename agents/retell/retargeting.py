@@ -13,13 +13,16 @@ import numpy as np
 
 from agents.budget import Budget, Meter, Progress
 from agents.finish import finish
+from agents.finish.align import Regularity
+from agents.finish.align import aligned as regular
+from agents.retell.frame import EXACT, Frame, axis_of
 from agents.retell.versions import Version, first_settled, neighbours, total_of, version_of
 from agents.solution import Solution
 from agents.trace.rings import signed_area, trace_rings
 from autopoly_env.arrays import FloatArray
 from autopoly_env.compute import map_threads
 from autopoly_env.errors import AutoPolyError, SequenceError
-from autopoly_env.mesh import PolyMesh
+from autopoly_env.mesh import PolyMesh, images_of, mirrored
 from autopoly_env.raster import coverage
 from autopoly_env.refit import FROM_AFAR, LOCAL, THOROUGH, RefitConfig, mended, refit
 from autopoly_env.score import Score
@@ -49,6 +52,8 @@ class Retargeted:
     aligned: PolyMesh  # which that is the score of
     start_iou: float  # of the start mesh on the new target
     least_start_iou: float  # below which it begins elsewhere than the given one did
+    n_level: int  # edges that are level or plumb as they were in the given one
+    n_tilted: int  # edges that were and are not
 
     @property
     def begins_elsewhere(self) -> bool:
@@ -61,9 +66,13 @@ def retarget(
     sequence: ConstructionSequence,
     budget: Budget,
     on_progress: Callable[[Progress], None] | None = None,
+    *,
+    keep_level: bool = False,
 ) -> Retargeted:
     """Tell `sequence` again for the simulator's target. KeyboardInterrupt ends the search with the best so far.
 
+    Where the simulator has an axis, the outline, which has to be symmetric in the given sequence, stays so. With
+    `keep_level` edges that are level or plumb in the last mesh stay so, whatever it costs, where no defect comes of it.
     All scores are at the silhouette's own resolution. Raises SequenceError as `align`.
     """
     meter = Meter(budget, on_progress)
@@ -81,13 +90,52 @@ def retarget(
                 version = max(version, better, key=worth)
     except KeyboardInterrupt:
         meter.stopped_by = "interrupted"
-    solution = finish(simulator, version.states(simulator), meter, keep_steps=True)
+    levelled = _levelled(simulator, version) if keep_level else None
+    version = levelled or version
+    is_levelled = levelled is not None
+    solution = finish(simulator, version.states(simulator), meter, keep_steps=True, keep_shape=is_levelled)
     n_steps = len(solution.sequence.steps)
     n_kept = sum(origin is not None for origin in version.origins[:n_steps])
     before, refitted = simulator.final_score(sequence.final()), simulator.final_score(aligned.mesh)
     n_dropped = len(sequence.steps) - n_kept
     start_iou = solution.sequence.start_score["iou"]
-    return Retargeted(solution, n_kept, n_dropped, n_steps - n_kept, before, refitted, aligned.mesh, start_iou, least)
+    offs = [regularity.off for regularity in _level_once(version, solution.mesh)]
+    n_level = sum(off <= EXACT for off in offs)
+    return Retargeted(
+        solution,
+        n_kept,
+        n_dropped,
+        n_steps - n_kept,
+        before,
+        refitted,
+        aligned.mesh,
+        start_iou,
+        least,
+        n_level,
+        len(offs) - n_level,
+    )
+
+
+def _levelled(simulator: Simulator, version: Version) -> Version | None:
+    """The version polished, level and plumb where the given one was, and regular; None where it cannot be told so."""
+    polished = simulator.polish(version.mesh)
+    mesh = regular(simulator, polished, _level_once(version, polished))
+    return first_settled(simulator, [replace(version, mesh=mesh, score=simulator.score(mesh))])
+
+
+def _level_once(version: Version, mesh: PolyMesh) -> list[Regularity]:
+    """Of the version's last mesh, or one before it, the edges that were level or plumb in the given one."""
+    old = version.told.final()
+    frame = Frame.of([old], None, keep_level=True)
+    groups = [dict(zip(old.vertex_ids, group[frame.anchors].tolist(), strict=True)) for group in frame.groups]
+    olds = {new: name for name, new in version.names().items()}
+    found = []
+    for a, b in mesh.edges.tolist():
+        one, other = olds.get(mesh.vertex_ids[a]), olds.get(mesh.vertex_ids[b])
+        for kind, group, off in zip("xy", groups, np.abs(mesh.vertices[a] - mesh.vertices[b]).tolist(), strict=True):
+            if one in group and other in group and group[one] == group[other]:
+                found.append(Regularity(kind, (a, b), off))
+    return found
 
 
 def _start_iou(simulator: Simulator, version: Version) -> float:
@@ -102,9 +150,9 @@ def align(simulator: Simulator, sequence: ConstructionSequence, meter: Meter) ->
     Raises SequenceError where no way leaves it without crossings and flipped faces.
     """
     found = [
-        version_of(simulator, told.start, _taken(told), range(1, len(told.steps) + 1), laid)
+        version_of(simulator, told, told.start, _taken(told), range(1, len(told.steps) + 1), laid)
         for told in _both_ways(sequence)
-        for laid in _allowed(_laid_over(told.final(), simulator), simulator)
+        for laid in _allowed(_alike(_laid_over(told.final(), simulator), simulator, told.final()), simulator)
     ]
     from_afar = _refitted(simulator, found, FROM_AFAR)
     again = _refitted(simulator, from_afar, THOROUGH)
@@ -180,9 +228,26 @@ def _laid_over(mesh: PolyMesh, simulator: Simulator) -> Iterator[PolyMesh]:
 def _allowed(meshes: Iterable[PolyMesh], simulator: Simulator) -> Iterator[PolyMesh]:
     """The meshes, mended where they break the simulator's rule of faces; those that cannot be are left out."""
     for mesh in meshes:
-        made = mesh if simulator.faces == "any" else mended(mesh, simulator.faces)
+        bonds = simulator.guidance.bonds(mesh)
+        made = mesh if simulator.faces == "any" else mended(mesh, simulator.faces, bonds)
         if made is not None:
             yield made
+
+
+def _alike(meshes: Iterable[PolyMesh], simulator: Simulator, old: PolyMesh) -> Iterator[PolyMesh]:
+    """The meshes, where the simulator has an axis, with vertices that are mirror images in `old` so about that."""
+    axis, own = simulator.guidance.axis, axis_of(old)
+    images = None if own is None else images_of(old, own)
+    for mesh in meshes:
+        if axis is None:
+            yield mesh
+        elif images is not None:
+            bound = images >= 0
+            vertices = mesh.vertices.copy()
+            vertices[bound] = 0.5 * (mesh.vertices[bound] + mirrored(mesh.vertices[images[bound]], axis))
+            made = mesh.with_vertices(vertices)
+            if simulator.guidance.is_symmetric(made):
+                yield made
 
 
 def _on_contours(mesh: PolyMesh, simulator: Simulator) -> PolyMesh:
@@ -212,7 +277,8 @@ def _refitted(simulator: Simulator, versions: Sequence[Version], config: RefitCo
     """Each with its last mesh refitted, on all cores."""
 
     def fit(version: Version) -> Version:
-        mesh = refit(version.mesh, simulator.refit_target(version.score.iou), config, faces=simulator.faces).mesh
+        target, bonds = simulator.refit_target(version.score.iou), simulator.guidance.bonds(version.mesh)
+        mesh = refit(version.mesh, target, config, bonds, simulator.faces).mesh
         return replace(version, mesh=mesh, score=simulator.score(mesh))
 
     return map_threads(fit, versions)

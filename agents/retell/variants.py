@@ -1,11 +1,12 @@
 """Variants of a construction: an early step's vertices are pulled somewhere else, and the later steps come along."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
+from agents.retell.frame import Frame, axis_of
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import AutoPolyError, SequenceError
 from autopoly_env.mesh import PolyMesh, is_sane
@@ -34,18 +35,29 @@ class Variant:
     n_tries: int  # draws that it took
 
 
-def draw_variants(sequence: ConstructionSequence, n: int, amount: float, seed: int) -> Iterator[Variant | None]:
+def draw_variants(
+    sequence: ConstructionSequence,
+    n: int,
+    amount: float,
+    seed: int,
+    *,
+    keep_level: bool = False,
+    keep_symmetry: bool = True,
+) -> Iterator[Variant | None]:
     """`n` variants that differ, None for one that was not found in `N_TRIES` draws.
 
     Every mesh on the way is free of self-intersections and flipped faces, keeps the sequence's rule of faces, and lies
     in the unit square: what leaves it is scaled down as a whole. `amount` is how far an edit pulls, in the unit square.
-    Raises SequenceError where the sequence itself has a defect.
+    With `keep_symmetry` an outline that is symmetric in the end is so in every variant, with `keep_level` every edge
+    that is level or plumb stays so. Raises SequenceError where the sequence itself has a defect.
     """
     check_sound(sequence)
     meshes = sequence.meshes()
     finals = [meshes[-1].vertices]
+    axis = axis_of(meshes[-1]) if keep_symmetry else None
+    frames = [Frame.of(meshes[k:], axis, keep_level=keep_level) for k in range(_n_early(sequence) + 1)]
     for index in range(n):
-        variant = _draw(sequence, meshes, amount, np.random.default_rng([seed, index]), finals)
+        variant = _draw(sequence, meshes, frames, amount, np.random.default_rng([seed, index]), finals)
         if variant is not None:
             finals.append(variant.sequence.final().vertices)
         yield variant
@@ -58,19 +70,25 @@ def check_sound(sequence: ConstructionSequence) -> None:
             raise SequenceError(f"step {number}: the mesh after it crosses itself or has flipped faces; mend it first")
 
 
+def _n_early(sequence: ConstructionSequence) -> int:
+    return int(EARLY * len(sequence.steps))
+
+
 def _draw(
     sequence: ConstructionSequence,
     meshes: list[PolyMesh],
+    frames: Sequence[Frame],
     amount: float,
     rng: np.random.Generator,
     finals: list[FloatArray],
 ) -> Variant | None:
-    """A variant whose last mesh is unlike all of `finals`."""
+    """A variant whose last mesh is unlike all of `finals`; frame k holds the meshes from number k on."""
     axes = _axes_of(meshes[-1])
     for n_tries in range(1, N_TRIES + 1):
-        k = int(rng.integers(0, int(EARLY * len(sequence.steps)) + 1))
-        pulls = _pulled(meshes[k], axes, amount, rng)
-        bend = ThinPlate.through(meshes[k].vertices, meshes[k].vertices + pulls)
+        k = int(rng.integers(0, len(frames)))
+        anchors = frames[k].places[frames[k].anchors]
+        pulls = frames[k].led(_pulled(meshes[k], anchors, axes, amount, rng))
+        bend = frames[k].held(ThinPlate.through(anchors, anchors + pulls))
         moved = [mesh.vertices if i < k else bend(mesh.vertices) for i, mesh in enumerate(meshes)]
         scale, shift = _fitting(moved)
         if any(_is_like(final, scale * moved[-1] + shift, _SAME * amount) for final in finals):
@@ -83,19 +101,33 @@ def _draw(
             varied = sequence.moved_by(partial(_place, k, bend, scale, shift))
         except AutoPolyError:  # a later step has no room
             continue
-        if all(is_sane(mesh, sequence.faces) for mesh in varied.meshes()):
-            names = tuple(meshes[k].vertex_ids[v] for v in np.flatnonzero(pulls.any(axis=1)))
-            return Variant(varied, k, names, n_tries)
+        if all(is_sane(mesh, sequence.faces) for mesh in varied.meshes()) and _keeps(frames[k], varied.final()):
+            names = tuple(name for name, pull in zip(meshes[k].vertex_ids, pulls, strict=False) if pull.any())
+            return Variant(_with_its_axis(varied), k, names, n_tries)
     return None
 
 
-def _pulled(mesh: PolyMesh, axes: FloatArray, amount: float, rng: np.random.Generator) -> FloatArray:
-    """(V, 2) how far each vertex is pulled, in the sum of a few ways."""
-    pulls = np.zeros_like(mesh.vertices)
+def _keeps(frame: Frame, final: PolyMesh) -> bool:
+    """Whether an outline that is to be symmetric is."""
+    return not frame.is_symmetric or axis_of(final) is not None
+
+
+def _with_its_axis(sequence: ConstructionSequence) -> ConstructionSequence:
+    """The sequence with the axis that it has now in its settings, where they tell of one."""
+    if "symmetry" not in sequence.settings:
+        return sequence
+    return replace(sequence, settings={**sequence.settings, "symmetry": axis_of(sequence.final())})
+
+
+def _pulled(
+    mesh: PolyMesh, points: FloatArray, axes: FloatArray, amount: float, rng: np.random.Generator
+) -> FloatArray:
+    """(P, 2) how far each of some points is pulled, in the sum of a few ways; the first are the mesh's vertices."""
+    pulls = np.zeros_like(points)
     for _ in range(rng.integers(*_N_PULLS)):
         length = amount * rng.uniform(_LEAST_PULL, 1.0) * rng.choice((-1.0, 1.0))
         if rng.random() < _END_SHARE:
-            pulls += length * _end_pulled(mesh.vertices @ axes.T, rng) @ axes
+            pulls += length * _end_pulled(points @ axes.T, rng) @ axes
         else:
             a, b = mesh.topology.boundary_half_edges[rng.integers(len(mesh.topology.boundary_half_edges))]
             pulls[[a, b] if rng.random() < 0.5 else [a]] += length * axes[rng.integers(2)]
@@ -103,9 +135,9 @@ def _pulled(mesh: PolyMesh, axes: FloatArray, amount: float, rng: np.random.Gene
 
 
 def _end_pulled(points: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """(V, 2) a pull of all vertices on one side of a line: out (longer legs), wider, or aside; 1 where it is most.
+    """(P, 2) a pull of all points on one side of a line: out (longer legs), wider, or aside; 1 where it is most.
 
-    Points and pulls are (V, 2) along the axes of the shape.
+    Points and pulls are (P, 2) along the axes of the shape.
     """
     u = int(rng.integers(2))
     heights = np.sort(points[:, u])

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from autopoly_env.errors import AutoPolyError
-from autopoly_env.mesh import PolyMesh
+from autopoly_env.mesh import PolyMesh, images_of
 from autopoly_env.operators import HOLE_SIDES, OPERATORS, Action
 from autopoly_env.placement import Disagreement
 from autopoly_env.score import Score
@@ -30,6 +30,7 @@ class Version:
     origins: tuple[int | None, ...]
     mesh: PolyMesh  # the last one, refitted; the steps may still lead to one that is not
     score: Score  # of `mesh`, at the simulator's resolution
+    told: ConstructionSequence  # the given one, or its mirror image
 
     @property
     def total(self) -> float:
@@ -40,6 +41,16 @@ class Version:
         """The steps, not scored."""
         return ConstructionSequence.record({}, self.start, _NO_SCORE, [(*one, _NO_SCORE) for one in self.taken])
 
+    def names(self) -> dict[int, int]:
+        """Of every vertex of `told` that is there, its id here."""
+        names = {name: name for name in self.start.vertex_ids}
+        for origin, step in zip(self.origins, self.sequence.steps, strict=True):
+            if origin is not None:
+                names.update(
+                    zip(self.told.steps[origin - 1].created["vertices"], step.created["vertices"], strict=True)
+                )
+        return names
+
     def states(self, simulator: Simulator) -> list[State]:
         """The construction as an agent's."""
         states = [State(self.start, simulator.score(self.start), n_refits=0)]
@@ -49,10 +60,15 @@ class Version:
 
 
 def version_of(
-    simulator: Simulator, start: PolyMesh, taken: Sequence[Taken], origins: Sequence[int | None], mesh: PolyMesh
+    simulator: Simulator,
+    told: ConstructionSequence,
+    start: PolyMesh,
+    taken: Sequence[Taken],
+    origins: Sequence[int | None],
+    mesh: PolyMesh,
 ) -> Version:
     """A version as it is, not refitted."""
-    return Version(start, tuple(taken), tuple(origins), mesh, simulator.score(mesh))
+    return Version(start, tuple(taken), tuple(origins), mesh, simulator.score(mesh), told)
 
 
 def total_of(version: Version) -> float:
@@ -106,20 +122,24 @@ def _brought(simulator: Simulator, mesh: PolyMesh, last: PolyMesh) -> PolyMesh:
 
 
 def neighbours(simulator: Simulator, version: Version) -> list[Version]:
-    """All versions that are one step away, the last mesh not refitted yet."""
+    """All versions that are one step away, or one and its mirror image; the last mesh not refitted yet."""
     found = [*_shorter(simulator, version), *_longer(simulator, version)]
-    return [one for one in found if len(one.taken) <= simulator.max_steps and simulator.is_sane(one.mesh)]
+    return [one for one in found if len(one.taken) <= simulator.max_steps and _may_be(simulator, one.mesh)]
+
+
+def _may_be(simulator: Simulator, mesh: PolyMesh) -> bool:
+    return simulator.is_sane(mesh) and simulator.guidance.is_symmetric(mesh)
 
 
 def _shorter(simulator: Simulator, version: Version) -> Iterator[Version]:
-    """Each step left out in turn, with the later ones that are illegal then."""
+    """Each step, or a step and its mirror image, left out in turn, with the later ones that are illegal then."""
     told = version.sequence
     meshes = told.meshes()
     seen = {version.origins}
-    for left_out in range(len(told.steps)):
+    for left_out in _left_out(version, simulator.guidance.axis):
         follower, taken, origins = Follower(meshes[0], meshes[0]), [], []
         for i, step in enumerate(told.steps):
-            if i != left_out:
+            if i not in left_out:
                 try:
                     taken.append(follower.take(step, meshes[i], meshes[i + 1], stay))
                 except AutoPolyError:
@@ -128,7 +148,18 @@ def _shorter(simulator: Simulator, version: Version) -> Iterator[Version]:
         if tuple(origins) not in seen:
             seen.add(tuple(origins))
             kept = tuple(version.origins[i] for i in origins)
-            yield version_of(simulator, version.start, tuple(taken), kept, follower.mesh)
+            yield version_of(simulator, version.told, version.start, tuple(taken), kept, follower.mesh)
+
+
+def _left_out(version: Version, axis: float | None) -> Iterator[set[int]]:
+    """Numbers of steps, from 0, that are left out together: one, and that which made the mirror images, if any did."""
+    images = None if axis is None else images_of(version.mesh, axis)
+    ids = version.mesh.vertex_ids
+    image = {} if images is None else {ids[v]: ids[w] for v, w in enumerate(images.tolist()) if w >= 0}
+    made = [frozenset(step.created["vertices"]).intersection(image) for step in version.sequence.steps]
+    makers = {names: i for i, names in enumerate(made) if names}
+    for i, names in enumerate(made):
+        yield {i, makers.get(frozenset(image[name] for name in names), i)}
 
 
 def _longer(simulator: Simulator, version: Version) -> Iterator[Version]:
@@ -138,12 +169,14 @@ def _longer(simulator: Simulator, version: Version) -> Iterator[Version]:
         if action.operator not in simulator.operators:
             continue
         try:
-            choice, mesh, _ = simulator.trial_of(disagreement, action).starts[0]
+            choice, mesh, halfway = simulator.trial_of(disagreement, action).starts[0]
         except AutoPolyError:
             continue
-        yield version_of(
-            simulator, version.start, (*version.taken, (action, choice, mesh)), (*version.origins, None), mesh
-        )
+        new: list[Taken] = [(action, choice, mesh)]
+        if halfway is not None:
+            new = [(action, choice, halfway.mesh), (halfway.action, halfway.choice, mesh)]
+        taken, origins = (*version.taken, *new), (*version.origins, *(None for _ in new))
+        yield version_of(simulator, version.told, version.start, taken, origins, mesh)
 
 
 def _worth_trying(disagreement: Disagreement, version: Version) -> Iterator[Action]:

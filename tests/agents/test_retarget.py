@@ -14,6 +14,7 @@ from PIL import Image
 
 from agents.budget import Budget, Meter, Progress
 from agents.retarget import _words, main
+from agents.retell.frame import axis_of
 from agents.retell.retargeting import align, retarget
 from autopoly_env.mesh import PolyMesh, is_sane
 from autopoly_env.operators import OPERATORS, Action
@@ -22,6 +23,7 @@ from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator
 from tests.helpers.commands import Run, runner
 from tests.helpers.paths import ROOT
+from tests.helpers.tables import table
 
 SCORE = {"iou": 0.5, "complexity": 9, "self_intersections": 0, "total": 50.0}
 
@@ -101,6 +103,53 @@ def test_result__replays_from_its_start_without_a_defect_on_the_way(target: Silh
     assert told.steps == () or told.steps[-1].score["total"] == pytest.approx(done.solution.score.total)
 
 
+def slanted(degrees: float) -> Silhouette:
+    """A box of 36 by 20 pixels, turned."""
+    y, x = np.mgrid[:64, :64] - 31.5
+    turn = np.radians(degrees)
+    u, v = x * np.cos(turn) + y * np.sin(turn), y * np.cos(turn) - x * np.sin(turn)
+    return Silhouette((np.abs(u) < 18) & (np.abs(v) < 10), "slanted")
+
+
+def off_axis(mesh: PolyMesh) -> float:
+    """How far the edge that is furthest from level or plumb is off."""
+    return float(np.abs(mesh.vertices[mesh.edges[:, 0]] - mesh.vertices[mesh.edges[:, 1]]).min(axis=1).max())
+
+
+def test_level_and_plumb_edges__stay_so_if_asked_to() -> None:
+    box = ConstructionSequence.record({"target": "box"}, PolyMesh.rectangle(0.2, 0.3, 0.8, 0.7), SCORE, [])
+    free = retarget(Simulator(slanted(10.0)), box, Budget(refits=30))
+    kept = retarget(Simulator(slanted(10.0)), box, Budget(refits=30), keep_level=True)
+    assert free.solution.score.iou > 0.98 and off_axis(free.solution.mesh) > 0.05
+    assert (free.n_level, free.n_tilted) == (0, 4)
+    assert 0.7 < kept.solution.score.iou < 0.95 and off_axis(kept.solution.mesh) < 1e-9
+    assert (kept.n_level, kept.n_tilted) == (4, 0)
+
+
+def test_level_edges__of_steps_that_are_kept_stay_so_among_others() -> None:
+    done = retarget(Simulator(TURNED), ell(), Budget(refits=60), keep_level=True)
+    assert done.n_kept == 2 and done.n_tilted == 0 and done.n_level == 6
+    assert done.solution.score.iou > 0.99
+    told = ConstructionSequence.from_json(done.solution.sequence.to_json())
+    assert told.final() == done.solution.mesh and off_axis(done.solution.mesh) < 1e-9
+
+
+def test_symmetric_construction__stays_symmetric_about_the_axis_of_the_simulator() -> None:
+    odd = picture((4, 12, 60, 20), (10, 20, 16, 58), (48, 20, 54, 57))  # one leg is a pixel shorter
+    free = retarget(Simulator(odd), table(), Budget(refits=60))
+    kept = retarget(Simulator(odd, symmetry=0.5), table(), Budget(refits=60))
+    assert axis_of(free.solution.mesh) is None
+    assert axis_of(kept.solution.mesh) == pytest.approx(0.5, abs=1e-9)
+    assert kept.solution.score.iou > 0.97 and kept.n_kept == 4
+
+
+def test_symmetric_construction__loses_a_step_and_its_mirror_image_together() -> None:
+    slab = picture((8, 20, 56, 30))
+    done = retarget(Simulator(slab, symmetry=0.5), table(), Budget(refits=100))
+    assert (done.n_kept, done.n_dropped) == (0, 4)
+    assert done.solution.mesh.counts == (4, 4, 1) and axis_of(done.solution.mesh) is not None
+
+
 def test_budget__is_kept_to() -> None:
     done = retarget(Simulator(TALL), ell(), Budget(refits=20))
     assert done.solution.stats.n_refits <= 20
@@ -138,6 +187,22 @@ def test_command__takes_the_object_that_the_options_name(run: Run) -> None:
     done = run("ell.json", "box.png", "--refits", 20, "--out", "made", "--object", "light", "--show-mask")
     assert (done.code, done.err) == (0, "")
     assert "mask.png" in os.listdir("made/box")
+
+
+def test_command__says_how_many_edges_stay_level_and_plumb(run: Run) -> None:
+    done = run("ell.json", "box.png", "--refits", 40, "--out", "made", "--keep-level")
+    assert (done.code, done.err) == (0, "")
+    assert "level and plumb: 3 of 3 edges stay so" in done.out
+
+
+def test_command__keeps_left_and_right_alike_unless_told_otherwise(run: Run) -> None:
+    table().save("table.json")
+    kept = run("table.json", "box.png", "--refits", 40, "--out", "kept")
+    free = run("table.json", "box.png", "--refits", 40, "--out", "free", "--no-symmetry")
+    assert (kept.code, free.code) == (0, 0)
+    assert "left and right stay alike (about x = 0.46875)" in kept.out
+    assert "alike" not in free.out
+    assert ConstructionSequence.load("kept/box/sequence.json").settings["symmetry"] == 0.46875
 
 
 def test_json__is_one_record_of_the_scores_before_and_after(run: Run) -> None:

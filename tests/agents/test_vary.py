@@ -56,6 +56,49 @@ def test_variants__differ_from_each_other_by_a_good_part_of_the_amount() -> None
         assert all(np.hypot(*(one - other).T).max() > 0.02 for other in finals[:i])
 
 
+def is_symmetric(mesh: PolyMesh) -> bool:
+    low, high = mesh.vertices[:, 0].min(), mesh.vertices[:, 0].max()
+    images = [low + high, 0.0] + [-1.0, 1.0] * mesh.vertices
+    return all(np.abs(mesh.vertices - image).max(axis=1).min() < 1e-9 for image in images)
+
+
+def tilted(mesh: PolyMesh) -> list[tuple[int, int]]:
+    """Edges by their ids that are neither level nor plumb; all edges of the table are one of them."""
+    ends = [(mesh.vertex_ids[a], mesh.vertex_ids[b]) for a, b in mesh.edges.tolist()]
+    ways = np.abs(mesh.vertices[mesh.edges[:, 0]] - mesh.vertices[mesh.edges[:, 1]])
+    return [pair for pair, way in zip(ends, ways, strict=True) if way.min() > 1e-12]
+
+
+@pytest.mark.parametrize("keep_level", [False, True])
+def test_variants__of_a_symmetric_construction_are_symmetric_unless_told_otherwise(keep_level: bool) -> None:
+    assert is_symmetric(table().final())
+    kept, free = (
+        [v for v in draw_variants(table(), 6, 0.1, 2, keep_level=keep_level, keep_symmetry=keep) if v]
+        for keep in (True, False)
+    )
+    assert len(kept) >= 5 and all(is_symmetric(variant.sequence.final()) for variant in kept)
+    assert not all(is_symmetric(variant.sequence.final()) for variant in free)
+
+
+@pytest.mark.parametrize("keep_symmetry", [False, True])
+def test_variants__keep_level_and_plumb_edges_so_if_asked_to(keep_symmetry: bool) -> None:
+    assert tilted(table().final()) == []
+    kept, free = (
+        [v for v in draw_variants(table(), 6, 0.1, 3, keep_level=keep, keep_symmetry=keep_symmetry) if v]
+        for keep in (True, False)
+    )
+    assert len(kept) >= 5 and all(tilted(mesh) == [] for v in kept for mesh in v.sequence.meshes())
+    assert any(tilted(variant.sequence.final()) for variant in free)
+
+
+def test_variants__move_the_same_vertices_as_before_in_every_later_step() -> None:
+    def moved(sequence: ConstructionSequence, first: int) -> list[list[int]]:
+        return [sorted(name for name, _, _ in step.moved) for step in sequence.steps[first:]]
+
+    for variant in draw_variants(table(), 6, 0.1, 4, keep_level=True):
+        assert variant is None or moved(variant.sequence, variant.step) == moved(table(), variant.step)
+
+
 def test_variants__depend_on_the_seed_alone() -> None:
     first, second, other = (
         [variant and variant.sequence.to_json() for variant in draw_variants(table(), 3, 0.1, seed)]
