@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
+from agents.commands.pulse import Pulse
 from agents.commands.running import GOES_ON, run_command
 from autopoly_env.errors import ConfigError, RunError
 from autopoly_env.files import write_atomically
@@ -16,7 +17,7 @@ from training.networks.labelling import SourceConfig, build_trajectory
 from training.networks.trajectories import VERSION, Shard
 from training.options import plain, read_config
 from training.parallel import map_tasks, n_cores
-from training.telling import Pulse, duration, settings_of
+from training.telling import duration, settings_of
 
 SHARD_SIZE = 64  # constructions
 

@@ -1,51 +1,15 @@
-"""What trainings say: signs of life while they go on, their settings with what they mean, their metrics as a table."""
+"""What trainings say: durations in words, their settings with what they mean, their metrics as a table."""
 
 import inspect
 import re
-import sys
-import threading
-import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any
 
 from autopoly_env.shown import short
 
-EVERY = 4.0  # seconds of silence, after which there is a sign of life
 BASELINES = ("residual", "majority", "chance", "least")  # how names of metrics end that others are measured against
 _FIELD = re.compile(r"^    (\w+): [^#\n]*?(?:  # (.*))?$", re.MULTILINE)
-
-
-class Pulse:
-    """A context in which stderr says where the work stands whenever nothing was said for a while.
-
-    `stands` is asked for that, in another thread. What is said by `say` goes to stdout at once, whatever buffers it.
-    """
-
-    def __init__(self, stands: Callable[[], str], every: float = EVERY) -> None:
-        self._stands, self._every = stands, every
-        self._over = threading.Event()
-        self._said = time.monotonic()
-        self._thread = threading.Thread(target=self._beat, daemon=True)
-
-    def __enter__(self) -> "Pulse":
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._over.set()
-        self._thread.join()
-
-    def say(self, line: str) -> None:
-        """Print a line to stdout, at once."""
-        self._said = time.monotonic()
-        print(line, flush=True)
-
-    def _beat(self) -> None:
-        while not self._over.wait(max(0.05, self._said + self._every - time.monotonic())):
-            if time.monotonic() - self._said >= self._every:
-                self._said = time.monotonic()
-                print(f"  ... {self._stands()}", file=sys.stderr, flush=True)
 
 
 def duration(seconds: float) -> str:

@@ -24,6 +24,7 @@ from stable_baselines3.common.utils import set_random_seed
 from stable_baselines3.common.vec_env import VecEnv
 
 from agents.commands.progress import progress_bar
+from agents.commands.pulse import Pulse
 from agents.rl.algorithms import load_checkpoint, make_model, net_of_zip
 from agents.rl.envs import EnvFactory, make_vec_env
 from agents.rl.network import MeshNet
@@ -36,7 +37,6 @@ from training.policies.config import RlRunConfig, TrainRlConfig
 from training.policies.export import export_policy
 from training.policies.run_state import LearningRate, RunState, state_in
 from training.policies.session import Session
-from training.telling import Pulse
 
 
 def train_rl(config: TrainRlConfig, folder: Path, trust: bool = False) -> RunState:

@@ -1,14 +1,12 @@
 """What trainings say: signs of life, settings with what they mean, metrics beside what they are measured against."""
 
-import threading
-
 import pytest
 
 from training.networks.labelling import SourceConfig
 from training.policies.clone_samples import CloneConfig
 from training.policies.config import TrainRlConfig
 from training.policies.run_state import RunState
-from training.telling import Pulse, duration, settings_of, table_of
+from training.telling import duration, settings_of, table_of
 from training.train_nfap import TrainNfapConfig
 from training.train_warpnet import TrainWarpnetConfig
 
@@ -26,25 +24,6 @@ def test_settings__say_what_they_mean() -> None:
     assert "run.eval_every = 50000  # steps" in lines
     assert "ppo.n_steps = 64  # of each environment between updates" in lines
     assert "# ppo: SB3's own arguments of PPO and MaskablePPO." in lines
-
-
-def test_pulse__says_where_things_stand_when_nothing_else_was_said(capsys: pytest.CaptureFixture[str]) -> None:
-    asked = threading.Event()
-
-    def stands() -> str:
-        asked.set()
-        return "step 3 of 9"
-
-    with Pulse(stands, every=0.01):
-        assert asked.wait(30.0)
-    assert "... step 3 of 9" in capsys.readouterr().err
-
-
-def test_pulse__keeps_still_while_others_speak(capsys: pytest.CaptureFixture[str]) -> None:
-    with Pulse(lambda: "nothing new", every=1000.0) as pulse:
-        pulse.say("step 1")
-    said = capsys.readouterr()
-    assert (said.out, said.err) == ("step 1\n", "")
 
 
 def test_metrics__stand_beside_their_baselines() -> None:

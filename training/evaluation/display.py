@@ -10,9 +10,7 @@ from agents.commands.screen import say
 from autopoly_env.shown import tame
 from training.evaluation.tasks import EvalTask
 from training.records import Record
-from training.telling import Pulse
 
-SECONDS_A_LINE = 4.0  # where there is no terminal
 MOST_FAILURES = 20  # that are told one by one
 MOST_NAMES = 2  # of tasks in work
 
@@ -24,23 +22,20 @@ class Display:
         self.n_failed = 0
         self._quiet = quiet
         self._console = Console(stderr=True)
-        self._bar = progress_bar(n_tasks, n_done=n_done, is_hidden=quiet, shows_left=True, console=self._console)
+        self._bar = progress_bar(
+            n_tasks, n_done=n_done, is_hidden=quiet, shows_left=True, console=self._console, stands=self._stands
+        )
         self._n_tasks, self._n_done, self._n_new = n_tasks, n_done, 0
         self._began = time.monotonic()
-        self._pulse = None if quiet or self._console.is_terminal else Pulse(self._stands, SECONDS_A_LINE)
         self._in_work: dict[tuple[str, str, int], None] = {}
         self._sums: defaultdict[str, float] = defaultdict(float)
         self._counts: Counter[str] = Counter()
 
     def __enter__(self) -> "Display":
         self._bar.start()
-        if self._pulse is not None:
-            self._pulse.__enter__()
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._pulse is not None:
-            self._pulse.__exit__()
         self._bar.stop()
 
     def begun(self, task: EvalTask) -> None:

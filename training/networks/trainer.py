@@ -19,13 +19,14 @@ import torch.distributed as dist
 from torch import Tensor, nn
 from torch.nn.parallel import DistributedDataParallel
 
+from agents.commands.pulse import Pulse
 from autopoly_env.arrays import ByteArray
 from autopoly_env.errors import ConfigError, RunError
 from autopoly_env.files import write_atomically
 from training.networks.streams import Batch, batches
 from training.options import check_same_run, claim_run
 from training.run_log import RunLog
-from training.telling import Pulse, duration
+from training.telling import duration
 
 _HARMLESS = ("n_workers", "n_threads", "device", "log_every", "save_every")  # a run may go on with other ones
 

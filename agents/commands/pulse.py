@@ -1,0 +1,40 @@
+"""`Pulse`: signs of life of what would be silent for long."""
+
+import sys
+import threading
+import time
+from collections.abc import Callable
+
+EVERY = 3.0  # seconds of silence, after which there is a sign of life
+
+
+class Pulse:
+    """A context in which stderr says where the work stands whenever nothing was said for a while.
+
+    `stands` is asked for that, in another thread. What is said by `say` goes to stdout at once, whatever buffers it.
+    """
+
+    def __init__(self, stands: Callable[[], str], every: float = EVERY) -> None:
+        self._stands, self._every = stands, every
+        self._over = threading.Event()
+        self._said = time.monotonic()
+        self._thread = threading.Thread(target=self._beat, daemon=True)
+
+    def __enter__(self) -> "Pulse":
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._thread.join()
+
+    def say(self, line: str) -> None:
+        """Print a line to stdout, at once."""
+        self._said = time.monotonic()
+        print(line, flush=True)
+
+    def _beat(self) -> None:
+        while not self._over.wait(max(0.05, self._said + self._every - time.monotonic())):
+            if time.monotonic() - self._said >= self._every:
+                self._said = time.monotonic()
+                print(f"  ... {self._stands()}", file=sys.stderr, flush=True)
