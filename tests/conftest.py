@@ -8,6 +8,7 @@ os.environ.setdefault("NUMBA_NUM_THREADS", "1")  # read when numba is imported, 
 import pytest
 from hypothesis import settings
 
+from agents.commands import pulse
 from autopoly_env.operators import OPERATORS
 from tests.helpers.browser import Browser
 
@@ -22,6 +23,12 @@ def own_operators() -> Iterator[None]:
     yield
     OPERATORS.clear()
     OPERATORS.update(known)
+
+
+@pytest.fixture(autouse=True)
+def no_pulse(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a command says depends on what it does, and not on how busy the machine is."""
+    monkeypatch.setattr(pulse, "EVERY", 1e6)
 
 
 @pytest.fixture(autouse=True)

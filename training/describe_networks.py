@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 from torch import nn
 
+from agents.commands.pulse import Pulse
 from agents.commands.running import run_command
 from agents.guided.config import NfapConfig, WarpConfig
 from agents.guided.nfap import NfapNet
@@ -25,7 +26,8 @@ app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 @app.command(help=__doc__)
 def describe() -> int:
     nets = _or_new(load_nfap, NfapNet(NfapConfig())), _or_new(load_warpnet, WarpNet(WarpConfig()))
-    columns = [cost(net) for net in nets]
+    with Pulse(lambda: "measuring the networks"):
+        columns = [cost(net) for net in nets]
     table = Table("", "nFAP-Net", "WarpNet")
     for what in columns[0]:
         table.add_row(what, *(f"{column[what]:,.2f}" for column in columns))

@@ -71,12 +71,10 @@ def train_rl(config: TrainRlConfig, folder: Path, trust: bool = False) -> RunSta
         session = Session(config, folder, state, lr)
         if not session.is_over:
             print(_banner(config, folder, state), flush=True)
-            with (
-                Pulse(session.stands),
-                progress_bar(run.total_steps, "steps", n_done=state.step, takes_prints=True) as session.bar,
-            ):
-                model.learn(run.total_steps - state.step, session, log_interval=None, reset_num_timesteps=False)  # type: ignore[arg-type]
-            session.end()
+            with Pulse(session.stands):
+                with progress_bar(run.total_steps, "steps", n_done=state.step, takes_prints=True) as session.bar:
+                    model.learn(run.total_steps - state.step, session, log_interval=None, reset_num_timesteps=False)  # type: ignore[arg-type]
+                session.end()
     finally:
         envs.close()
     return state

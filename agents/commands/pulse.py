@@ -14,8 +14,8 @@ class Pulse:
     `stands` is asked for that, in another thread. What is said by `say` goes to stdout at once, whatever buffers it.
     """
 
-    def __init__(self, stands: Callable[[], str], every: float = EVERY) -> None:
-        self._stands, self._every = stands, every
+    def __init__(self, stands: Callable[[], str], every: float | None = None) -> None:
+        self._stands, self._every = stands, EVERY if every is None else every
         self._over = threading.Event()
         self._said = time.monotonic()
         self._thread = threading.Thread(target=self._beat, daemon=True)

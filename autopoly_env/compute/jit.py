@@ -13,14 +13,18 @@ import multiprocessing
 import os
 import subprocess
 import sys
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numba
-from numba import njit, types
-from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
-from numba.core.registry import cpu_target
+with warnings.catch_warnings(record=True) as _said:  # of its variables; a warning of Numba's has a traceback in it
+    import numba
+    from numba import njit, types
+    from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
+    from numba.core.registry import cpu_target
+for _one in _said:
+    print("autopoly_env:", str(_one.message).partition("\n")[0], file=sys.stderr)
 
 ALONE = "AUTOPOLY_WARM"  # a variable of the environment: 0 in a process that is to compile what it calls by itself
 _announced = _sought = False

@@ -2,6 +2,7 @@
 
 import os
 import threading
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -145,13 +146,9 @@ def _n_frames(image: Image.Image) -> int:
 def _read_pillow(image: Image.Image, name: str, label: str) -> Picture:
     """The frame that the image stands at."""
     width, height = image.size
-    if width * height > MAX_PIXELS:
-        limit = f"expected at most {MAX_PIXELS // 10**6} megapixels: scale it down first"
-        raise SilhouetteError(f"{label} has {width}x{height} pixels; {limit}")
-    if width * height == 0:
-        raise _without_pixels(label, f"{width}x{height}")
+    _check_size(label, width, height)
     try:
-        with _pillow_limit(MAX_PIXELS):
+        with _pillow_limit(MAX_PIXELS), _decoder_hushed(image):
             animated = getattr(image, "is_animated", False)
             image.load()
         layers, notes = reduced(lambda top, end: pillow_layers(image, top, end), width, height)
@@ -174,8 +171,10 @@ def _read_array(array: AnyArray) -> Picture:
     if array.ndim not in (2, 3) or (array.ndim == 3 and array.shape[2] not in (1, 2, 3, 4)):
         raise SilhouetteError(f"{label} is no image; expected (H, W) or (H, W, 1 to 4): reshape it")
     height, width = array.shape[:2]
-    if array.size == 0:
-        raise _without_pixels(label, f"{width}x{height}")
+    _check_size(label, width, height)
+    if np.ma.is_masked(array):
+        raise SilhouetteError(f"{label} has masked pixels; expected values: fill them, e.g. array.filled(0)")
+    array = np.asarray(array)
     is_mask = array.dtype == np.bool_
     if is_mask and array.size != width * height:
         raise SilhouetteError(f"{label} is no mask; expected one channel: combine them, e.g. array.any(axis=2)")
@@ -202,8 +201,9 @@ def _picture(layers: Layers, name: str, label: str, notes: list[str]) -> Picture
 
 @contextmanager
 def _pillow_limit(n_pixels: int | None) -> Iterator[None]:
-    """Set Pillow's decompression-bomb limit, a global, for as long as the block runs."""
-    with _pillow_lock:
+    """Set Pillow's decompression-bomb limit, a global, for as long as the block runs; its warnings are left out."""
+    with _pillow_lock, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
         before = Image.MAX_IMAGE_PIXELS
         Image.MAX_IMAGE_PIXELS = n_pixels
         try:
@@ -212,8 +212,33 @@ def _pillow_limit(n_pixels: int | None) -> Iterator[None]:
             Image.MAX_IMAGE_PIXELS = before
 
 
-def _without_pixels(label: str, size: str) -> SilhouetteError:
-    return SilhouetteError(f"{label} has no pixels ({size}); expected at least 2: give another image")
+@contextmanager
+def _decoder_hushed(image: Image.Image) -> Iterator[None]:
+    """Keep off stderr what libtiff writes there by itself of a damaged file; the error that follows tells of it."""
+    try:
+        before = os.dup(2) if image.format == "TIFF" else None
+    except OSError:  # there is no stderr
+        before = None
+    if before is None:
+        yield
+        return
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        yield
+    finally:
+        os.dup2(before, 2)
+        os.close(before)
+        os.close(nowhere)
+
+
+def _check_size(label: str, width: int, height: int) -> None:
+    """Raise SilhouetteError if there are no pixels, or too many."""
+    if width * height > MAX_PIXELS:
+        limit = f"expected at most {MAX_PIXELS // 10**6} megapixels: scale it down first"
+        raise SilhouetteError(f"{label} has {width}x{height} pixels; {limit}")
+    if width * height == 0:
+        raise SilhouetteError(f"{label} has no pixels ({width}x{height}); expected at least 2: give another image")
 
 
 def _undecodable(label: str, error: Exception) -> SilhouetteError:

@@ -2,7 +2,9 @@
 
 from dataclasses import dataclass
 
+from autopoly_env.arguments import number, whole
 from autopoly_env.errors import ConfigError
+from autopoly_env.shown import short
 from autopoly_env.silhouette.colours import parse_colour
 
 WORDS = ("auto", "dark", "light", "alpha")
@@ -40,10 +42,10 @@ class ObjectOptions:
             _checked_colour("background", self.background, "a colour")
         for name in ("threshold", "alpha_threshold"):
             share = getattr(self, name)
-            if share is not None and not 0 < share < 1:
+            if share is not None and not 0 < number(name, share) < 1:
                 raise ConfigError(f"{name} is {share:g}; expected a number between 0 and 1, without the ends")
-        if self.min_speck is not None and self.min_speck < 0:
-            raise ConfigError(f"min_speck is {self.min_speck}; expected pixels, 0 or more: 0 keeps every speck")
+        if self.min_speck is not None:
+            whole("min_speck", self.min_speck)
         if self.keep_specks and self.min_speck:
             raise ConfigError(f"min_speck {self.min_speck} and keep_specks contradict each other; give one of them")
         if self.object in ("dark", "light", "alpha") and self.background is not None:
@@ -65,6 +67,6 @@ DEFAULT_OPTIONS = ObjectOptions()
 def _checked_colour(name: str, text: str, expected: str) -> None:
     try:
         parse_colour(text)
-    except ValueError:
+    except (AttributeError, TypeError, ValueError):
         example = "such as red, #d04020 or rgb(208, 64, 32)"
-        raise ConfigError(f"{name} {text!r} is not known; expected {expected}, {example}") from None
+        raise ConfigError(f"{name} {short(text)} is not known; expected {expected}, {example}") from None

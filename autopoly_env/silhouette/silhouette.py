@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from autopoly_env.arguments import whole
 from autopoly_env.arrays import AnyArray, BoolArray, FloatArray, IntArray
-from autopoly_env.errors import ConfigError, SilhouetteError
+from autopoly_env.errors import SilhouetteError
 from autopoly_env.silhouette import cleaning, object_mask
 from autopoly_env.silhouette.connectivity import is_slanting_line
 from autopoly_env.silhouette.image_files import find_images
@@ -19,6 +20,7 @@ from autopoly_env.silhouette.options import DEFAULT_OPTIONS, ObjectOptions
 __all__ = ["SMALL", "ImageSource", "Silhouette", "Target", "find_images", "load_silhouette"]
 
 WEIGHT_STEPS = 2**20  # of a weight of 1
+MOST_RESOLUTION = 4096  # of a target
 SMALL = 64  # pixels a side; a smaller picture has too few pixels to tell shapes apart by counting them
 
 
@@ -130,10 +132,9 @@ class Silhouette:
         The resolution need not divide the silhouette's own, and may exceed it (which gives blocks). At its own, that of
         a small picture is scored by area.
 
-        Raises ConfigError for a resolution below 1.
+        Raises ConfigError for a resolution that is no whole number from 1 to `MOST_RESOLUTION`.
         """
-        if resolution < 1:
-            raise ConfigError(f"target resolution {resolution} is too small; expected at least 1: raise it")
+        resolution = whole("target resolution", resolution, 1, MOST_RESOLUTION)
         if resolution not in self._targets:
             weights = None if self.weights is None else area_means(self.weights, (resolution, resolution))
             by_area = self.is_scored_by_area and resolution == self.resolution

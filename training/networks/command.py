@@ -4,14 +4,16 @@ Each script hands in what is its own: the settings and their defaults, what is t
 """
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Annotated, Any, Protocol, TypeVar
 
 import torch
 import typer
 
+from agents.commands.pulse import Pulse
 from agents.commands.running import GOES_ON, run_command
-from training.networks.trainer import OptimConfig, RunConfig, TrainingTask, process_of, train
+from training.networks.trainer import OptimConfig, Process, RunConfig, TrainingTask, process_of, train
 from training.options import plain, read_config
 from training.telling import settings_of
 
@@ -70,11 +72,18 @@ def train_network(
     if show_config:
         return print_config(settings)
     with process_of(settings.run) as process:
-        task = make_task(settings)
+        with _pulse(process, "reading the shards"):
+            task = make_task(settings)
         train(task, settings.optim, settings.run, plain(settings), folder, process)
         if process.leads:
-            finish(task, plain(settings), folder, process.device)
+            with _pulse(process, "measuring the result"):
+                finish(task, plain(settings), folder, process.device)
     return 0
+
+
+def _pulse(process: Process, what: str) -> AbstractContextManager[object]:
+    """Signs of life of the process that speaks for all."""
+    return Pulse(lambda: what) if process.leads else nullcontext()
 
 
 def run_training(app: typer.Typer, arguments: list[str] | None, module: str) -> int:

@@ -54,6 +54,12 @@ class BestPolicy:
         self._config, self._folder, self._last = config, folder, state.step
         self._evaluations = evaluations_of(config.env, config.run.n_eval, config.run.eval_resolution)
 
+    @property
+    def n_steps(self) -> float:
+        """Steps of the training that an evaluation is as much work as; refits take as long as pictures are high."""
+        env, run = self._config.env, self._config.run
+        return len(env.courses) * run.n_eval * env.max_steps * run.eval_resolution / env.resolution
+
     def is_due(self, state: RunState) -> bool:
         """Whether it is time for an evaluation."""
         return state.step - self._last >= self._config.run.eval_every
@@ -120,6 +126,7 @@ class Session(BaseCallback):
         self.bar: Progress | None = None  # of steps
         self.is_timed = False  # whether the clock is running, and not an exam or saving
         self._exam_seconds = self._update_seconds = 0.0  # that the last ones took
+        self._begun_at = (state.step, state.seconds)
         self._told = -math.inf  # when there was a line of an update
 
     @property
@@ -129,13 +136,23 @@ class Session(BaseCallback):
 
     def _is_late(self) -> bool:
         minutes = self.config.run.minutes
-        spent = self.state.seconds + (self.log.clock.running() if self.is_timed else 0.0)
-        return bool(minutes) and spent + self._exam_seconds + self._update_seconds >= 60.0 * minutes
+        spent = self._spent()
+        return bool(minutes) and spent + self._exam_takes(spent) + self._update_seconds >= 60.0 * minutes
+
+    def _spent(self) -> float:
+        return self.state.seconds + (self.log.clock.running() if self.is_timed else 0.0)
+
+    def _exam_takes(self, spent: float) -> float:
+        """Seconds of an exam: as long as the last one or, before the first, as so many steps of the training."""
+        n_steps, seconds = self.num_timesteps - self._begun_at[0], spent - self._begun_at[1]
+        if self._exam_seconds or n_steps <= 0:
+            return self._exam_seconds
+        return self.best.n_steps * seconds / n_steps
 
     def stands(self) -> str:
         """Where the training stands, in a few words."""
         state = self.state
-        spent = state.seconds + (self.log.clock.running() if self.is_timed else 0.0)
+        spent = self._spent()
         what = "" if self.is_timed else ", exam or saving"
         return f"step {max(state.step, self.num_timesteps)} of {self.config.run.total_steps}, {duration(spent)}{what}"
 

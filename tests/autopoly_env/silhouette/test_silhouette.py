@@ -135,8 +135,9 @@ def test_silhouette__refuses_what_is_no_square_mask_with_an_object(mask: np.ndar
 
 
 def test_silhouette__refuses_settings_out_of_range() -> None:
-    with pytest.raises(ConfigError, match="at least 1"):
-        Silhouette(l_shape()).target(0)
+    for resolution in (0, -1, 1.5, "8", None, float("nan"), 10**5):
+        with pytest.raises(ConfigError, match=r"target resolution=.*: expected a whole number of at least 1"):
+            Silhouette(l_shape()).target(resolution)  # type: ignore[arg-type]
     with pytest.raises(ConfigError, match="min_speck"):
         load_silhouette(l_shape(), options=ObjectOptions(min_speck=-1))
 
@@ -398,6 +399,25 @@ def test_load__refuses_more_than_500_megapixels_without_a_warning() -> None:
     assert Image.MAX_IMAGE_PIXELS == limit
 
 
+def test_load__refuses_more_than_500_megapixels_of_an_array_at_once() -> None:
+    message = refusal(np.broadcast_to(np.uint8(1), (100_000, 100_000)))
+    assert "100000x100000" in message and "500 megapixels" in message
+
+
+def test_load__says_alone_what_is_wrong_with_a_damaged_tiff(capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = tmp_path / "cut.tif"
+    grey_image(l_shape().repeat(20, 0).repeat(20, 1)).save(path, compression="tiff_lzw")
+    whole = bytearray(path.read_bytes())
+    for k in range(20, 60):  # of the strip: of itself libtiff writes to stderr that it cannot read it
+        whole[k] = 255
+    path.write_bytes(whole)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        message = refusal(path)
+    assert "cannot be decoded" in message
+    assert capfd.readouterr() == ("", "")
+
+
 # --- refusals ---
 
 
@@ -405,6 +425,7 @@ def test_load__refuses_more_than_500_megapixels_without_a_warning() -> None:
     ("source", "finding"),
     [
         (Image.new("L", (9, 9), 0), "black everywhere: there is no object"),
+        (np.ma.masked_array(np.ones((9, 9, 3)), np.eye(9, dtype=bool)[:, :, None].repeat(3, 2)), "has masked pixels"),
         (Image.new("RGB", (9, 9), (255, 255, 255)), "white everywhere: there is no object"),
         (Image.new("L", (9, 9), 51), "grey level 0.2 everywhere: there is no object"),
         (Image.new("RGBA", (9, 9), (1, 2, 3, 0)), "transparent everywhere: there is no object"),
