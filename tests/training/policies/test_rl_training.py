@@ -31,6 +31,8 @@ from training.policies import training_log
 from training.policies.clone_samples import CloneConfig
 from training.policies.config import LearningRateConfig, TrainRlConfig
 from training.policies.evaluation import Evaluation, evaluate, evaluations_of, mean_final, play_all
+from training.policies.run_state import LearningRate, RunState
+from training.policies.session import Session
 
 torch.set_num_threads(1)  # as tests run beside each other
 
@@ -173,6 +175,18 @@ def test_run_from_a_policy__is_never_worse_than_it(trained: dict[str, Path], tmp
     exams = rows(tmp_path, "eval")
     assert exams[0]["step"] == 0 and exams[0]["eval/final"] == pytest.approx(given) and len(exams) > 1
     assert state.best == max(exam["eval/final"] for exam in exams)
+
+
+@pytest.mark.parametrize(("minutes", "is_over"), [(0.349, True), (0.351, False)])
+def test_minutes__have_room_for_the_first_exam(minutes: float, is_over: bool, tmp_path: Path) -> None:
+    settings = config(
+        f"run.minutes={minutes}", "run.eval_resolution=64", "run.n_eval=3"
+    )  # 2 * 3 episodes, 5 steps each
+    state = RunState()
+    session = Session(settings, tmp_path, state, LearningRate(settings.optim))
+    session.num_timesteps, state.seconds = 100, 100 * 0.13125
+    # 13.125 seconds are gone, 0.13125 a step; an exam is 60 steps, at twice the resolution: 7.875 seconds
+    assert session.is_over == is_over
 
 
 @pytest.mark.parametrize("file", ["policy.safetensors", "checkpoint.zip"])
