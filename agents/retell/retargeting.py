@@ -99,7 +99,7 @@ def retarget(
     before, refitted = simulator.final_score(sequence.final()), simulator.final_score(aligned.mesh)
     n_dropped = len(sequence.steps) - n_kept
     start_iou = solution.sequence.start_score["iou"]
-    offs = [regularity.off for regularity in _level_once(version, solution.mesh)]
+    offs = _off_line(version, solution.mesh)
     n_level = sum(off <= EXACT for off in offs)
     return Retargeted(
         solution,
@@ -119,23 +119,37 @@ def retarget(
 def _levelled(simulator: Simulator, version: Version) -> Version | None:
     """The version polished, level and plumb where the given one was, and regular; None where it cannot be told so."""
     polished = simulator.polish(version.mesh)
-    mesh = regular(simulator, polished, _level_once(version, polished))
+    wanted: list[Regularity] = []
+    for kind, rows in zip("xy", _lines(version, polished), strict=True):
+        last: dict[int, int] = {}  # vertex of each line
+        for v, line in rows.items():
+            if line in last:
+                wanted.append(Regularity(kind, (last[line], v), 0.0))
+            last[line] = v
+    mesh = regular(simulator, polished, wanted)
     return first_settled(simulator, [replace(version, mesh=mesh, score=simulator.score(mesh))])
 
 
-def _level_once(version: Version, mesh: PolyMesh) -> list[Regularity]:
-    """Of the version's last mesh, or one before it, the edges that were level or plumb in the given one."""
+def _off_line(version: Version, mesh: PolyMesh) -> list[float]:
+    """How far edges of the mesh, the version's last or one before it, are off level or plumb that were so once."""
+    return [
+        abs(float(mesh.vertices[a, axis] - mesh.vertices[b, axis]))
+        for axis, lines in enumerate(_lines(version, mesh))
+        for a, b in mesh.edges.tolist()
+        if lines.get(a, -1) == lines.get(b, -2)
+    ]
+
+
+def _lines(version: Version, mesh: PolyMesh) -> tuple[dict[int, int], dict[int, int]]:
+    """Of vertices of the mesh the plumb lines, and the level ones, that edges of the given last mesh put them on."""
     old = version.told.final()
     frame = Frame.of([old], None, keep_level=True)
-    groups = [dict(zip(old.vertex_ids, group[frame.anchors].tolist(), strict=True)) for group in frame.groups]
     olds = {new: name for name, new in version.names().items()}
-    found = []
-    for a, b in mesh.edges.tolist():
-        one, other = olds.get(mesh.vertex_ids[a]), olds.get(mesh.vertex_ids[b])
-        for kind, group, off in zip("xy", groups, np.abs(mesh.vertices[a] - mesh.vertices[b]).tolist(), strict=True):
-            if one in group and other in group and group[one] == group[other]:
-                found.append(Regularity(kind, (a, b), off))
-    return found
+    names = {v: olds[name] for v, name in enumerate(mesh.vertex_ids) if olds.get(name) in old.vertex_ids}
+    plumb, level = (
+        {v: int(group[frame.anchors[old.vertex_index(name)]]) for v, name in names.items()} for group in frame.groups
+    )
+    return plumb, level
 
 
 def _start_iou(simulator: Simulator, version: Version) -> float:
