@@ -7,7 +7,7 @@ import sys
 
 import typer
 
-from agents.commands.starting import listen
+from agents.commands.starting import listen, note_interrupt
 from autopoly_env.errors import AutoPolyError, ConfigError
 from autopoly_env.shown import told
 
@@ -41,6 +41,8 @@ def run_command(app: typer.Typer, arguments: list[str] | None, name: str, *, sto
         if not hasattr(error, "format_message"):  # which typer's own usage errors have
             raise
         return complain(f"{error.format_message()} (see --help)", USAGE_ERROR)
+    if code in (TOLD, INTERRUPTED):
+        note_interrupt()
     if code == TOLD:
         return INTERRUPTED
     if code == INTERRUPTED:  # typer makes that of a KeyboardInterrupt

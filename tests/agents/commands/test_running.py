@@ -94,3 +94,31 @@ def test_ctrl_c__while_modules_are_imported_is_one_line(module: str, tmp_path: P
     process.send_signal(2)
     _, said = process.communicate(timeout=30)
     assert (process.returncode, said) == (INTERRUPTED, "error: stopped by Ctrl-C\n")
+
+
+ODD_COMMAND = """
+from agents.commands.starting import guard_imports
+
+guard_imports()
+import sys
+import typer
+from agents.commands.running import run_command
+
+app = typer.Typer()
+
+@app.command()
+def odd():
+    exec("import os, signal\\nos.kill(os.getpid(), signal.SIGINT)\\nfor _ in range(10**6): pass")
+
+sys.exit(run_command(app, [], "odd"))
+"""
+
+
+@pytest.mark.slow
+def test_ctrl_c__in_an_exec_of_text_leaves_the_exit_code_alone(tmp_path: Path) -> None:
+    """Of itself `python -m` ends by the signal there, though the KeyboardInterrupt was caught."""
+    (tmp_path / "odd.py").write_text(ODD_COMMAND)
+    path = os.pathsep.join((str(tmp_path), str(ROOT)))
+    command = [sys.executable, "-m", "odd"]
+    done = subprocess.run(command, env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (INTERRUPTED, "error: stopped by Ctrl-C\n")
