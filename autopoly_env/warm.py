@@ -24,7 +24,14 @@ from autopoly_env.details import hairlines
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import OPERATORS, legal_actions
 from autopoly_env.placement import Disagreement, tried
-from autopoly_env.raster import coverage, coverage_many, loss_and_gradient, loss_and_gradient_many
+from autopoly_env.raster import (
+    batch_of,
+    coverage,
+    coverage_many,
+    coverage_vjp,
+    loss_and_gradient,
+    loss_and_gradient_many,
+)
 from autopoly_env.refit import RefitTarget, mended, refit, tune
 from autopoly_env.score import ScoreWeights, score
 from autopoly_env.silhouette import Silhouette
@@ -135,17 +142,20 @@ def pictures() -> None:
     score(mesh, target, ScoreWeights())
     hairlines(mesh, target)
     tune(mesh, target)
+    coverage_vjp(batch_of([mesh]), np.ones((1, 32, 32)))
 
 
 def operators() -> None:
     """What operators ask of meshes, and the random constructions."""
-    mesh, silhouette = PolyMesh.rectangle(0.2, 0.2, 0.8, 0.7), _frame()
-    mended(mesh, "quads")
-    for action in legal_actions(mesh, tuple(OPERATORS))[1:]:
-        with contextlib.suppress(Exception):  # some have no room here
-            tried(Disagreement(mesh, silhouette), action)
-    for seed in range(4):
-        ConstructionTargets().sample(seed)
+    rectangle, silhouette = PolyMesh.rectangle(0.2, 0.2, 0.8, 0.7), _frame()
+    mended(rectangle, "quads")
+    for mesh in (rectangle, _ell()):
+        for action in legal_actions(mesh, tuple(OPERATORS))[1:]:
+            with contextlib.suppress(Exception):  # some have no room here
+                tried(Disagreement(mesh, silhouette), action)
+    for source in (ConstructionTargets(), ConstructionTargets(operators="full")):
+        for seed in range(4):
+            source.sample(seed)
 
 
 def _end_with(parent: int) -> None:
@@ -153,6 +163,12 @@ def _end_with(parent: int) -> None:
     while os.getppid() == parent:
         time.sleep(0.5)
     os._exit(1)
+
+
+def _ell() -> PolyMesh:
+    """Three quads about a corner that may be filled."""
+    places = [(0.2, 0.2), (0.4, 0.2), (0.4, 0.4), (0.2, 0.4), (0.4, 0.6), (0.2, 0.6), (0.6, 0.4), (0.6, 0.6)]
+    return PolyMesh.from_faces(places, [(0, 1, 2, 3), (3, 2, 4, 5), (2, 6, 7, 4)])
 
 
 def _frame() -> Silhouette:

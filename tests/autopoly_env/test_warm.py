@@ -78,6 +78,7 @@ COMMANDS = (
     "agents.vary OUT/mug/mug/sequence.json --out OUT/vary",
     "agents.retarget OUT/mug/mug/sequence.json examples/bottle.png --out OUT/retarget",
     "training.evaluate examples --agents greedy,trace --budget refits=30 --engine serial --out OUT/evaluate",
+    "training.make_expert OUT/expert --n 64 --engine serial source=simulator",
 )
 
 
