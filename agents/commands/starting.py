@@ -8,12 +8,14 @@ import atexit
 import os
 import signal
 import sys
+import time
 from contextlib import suppress
 from types import FrameType
 from typing import NoReturn
 
 _LINE = b"error: stopped by Ctrl-C\n"
 _INTERRUPTED = 130
+BEGAN = time.monotonic()  # when the command did, nearly
 _is_command = _is_interrupted = False
 
 

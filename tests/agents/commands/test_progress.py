@@ -61,7 +61,7 @@ def test_pulse__says_where_things_stand_when_nothing_else_was_said(capsys: pytes
 
 
 def test_pulse__keeps_still_while_others_speak(capsys: pytest.CaptureFixture[str]) -> None:
-    with Pulse(lambda: "nothing new", every=1000.0) as pulse:
+    with Pulse(lambda: "nothing new", every=1e6) as pulse:
         pulse.say("step 1")
     said = capsys.readouterr()
     assert (said.out, said.err) == ("step 1\n", "")
