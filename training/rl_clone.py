@@ -13,6 +13,7 @@ The same command goes on with a run that was stopped.
 """
 
 import json
+import math
 import sys
 from pathlib import Path
 from typing import Any
@@ -30,6 +31,7 @@ from training.networks.metrics import mean_rows
 from training.networks.streams import Batch, HeldOut, stored
 from training.policies.clone_samples import PICTURES, CloneConfig, CloneStream
 from training.policies.evaluation import evaluate, evaluations_of, flat, mean_final, mean_start, summary
+from training.run_log import known
 from training.telling import table_of
 
 
@@ -76,7 +78,8 @@ class CloneTask:
             terms = {name: float(term) for name, term in self.losses.terms(logits, value, batch).items()}
             best = batch["gains"].amax(-1)
             won = batch["gains"].gather(1, logits.argmax(-1, keepdim=True))[:, 0].clamp(min=-10.0)
-            rows.append({**terms, "gain_share": float(won.sum() / best.sum().clamp(min=1e-6))})
+            has_gains = float(best.sum()) > 0.0  # which shards of the random constructions have not
+            rows.append({**terms, "gain_share": float(won.sum() / best.sum()) if has_gains else math.nan})
         return mean_rows(rows)
 
     def draw(self, _device: torch.device) -> Any:
@@ -89,7 +92,7 @@ def finish_clone(task: CloneTask, settings: dict[str, Any], folder: Path, _devic
     """Measure and evaluate the network that `train` left; write report.json and policy.safetensors."""
     config, net = task.config, task.net.cpu().eval()
     with torch.no_grad():
-        held_out = task.measure(torch.device("cpu"))
+        held_out = known(task.measure(torch.device("cpu")))
     built = evaluate(evaluations_of(config.env, config.n_exam, 128), net)
     metrics = {**held_out, **flat(built), "final": mean_final(built)}
     write_atomically(folder / "report.json", json.dumps({"metrics": metrics, "settings": settings}, indent=2) + "\n")

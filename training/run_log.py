@@ -1,6 +1,7 @@
 """What a training run leaves behind: a line of JSON for every measurement, pictures, and TensorBoard's files."""
 
 import json
+from collections.abc import Mapping
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,11 @@ from PIL import Image
 from autopoly_env.arrays import ByteArray
 from autopoly_env.errors import RunError
 from autopoly_env.files import write_atomically
+
+
+def known(metrics: Mapping[str, float]) -> dict[str, float]:
+    """The metrics but those that are NaN, for which the samples have nothing to measure by; JSON has no NaN."""
+    return {name: value for name, value in metrics.items() if value == value}
 
 
 class RunLog:
@@ -32,8 +38,8 @@ class RunLog:
             print("no TensorBoard files (pip install tensorboard to have them); log.jsonl has everything", flush=True)
 
     def write(self, step: int, group: str, values: dict[str, float]) -> None:
-        """Log some numbers of a step, as group/name."""
-        named = {f"{group}/{name}": value for name, value in values.items()}
+        """Log some numbers of a step, as group/name; none that are NaN."""
+        named = {f"{group}/{name}": value for name, value in known(values).items()}
         with self._path.open("a", encoding="utf-8") as file:
             file.write(json.dumps({"step": step, **named}) + "\n")
         if self._board is not None:

@@ -6,6 +6,7 @@ from training.networks.labelling import SourceConfig
 from training.policies.clone_samples import CloneConfig
 from training.policies.config import TrainRlConfig
 from training.policies.run_state import RunState
+from training.run_log import known
 from training.telling import duration, settings_of, table_of
 from training.train_nfap import TrainNfapConfig
 from training.train_warpnet import TrainWarpnetConfig
@@ -30,6 +31,10 @@ def test_metrics__stand_beside_their_baselines() -> None:
     table = table_of({"loss": 0.5, "top3": 0.75, "top3_residual": 0.5, "top3_chance": 0.125, "choice": 1.0})
     rows = [line.split(None, 2) for line in table.splitlines()]
     assert rows[1:] == [["loss", "0.5"], ["top3", "0.75", "residual 0.5, chance 0.125"], ["choice", "1"]]
+
+
+def test_metrics__that_samples_have_nothing_to_measure_by_are_left_out() -> None:
+    assert known({"loss": 0.5, "gain_share": float("nan"), "lost": float("inf")}) == {"loss": 0.5, "lost": float("inf")}
 
 
 def test_policy__that_is_worth_no_more_than_the_rectangle_has_not_learnt() -> None:

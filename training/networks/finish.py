@@ -13,6 +13,7 @@ from agents.guided.weights import SHIPPED, save_weights
 from autopoly_env.files import write_atomically
 from training.networks.cost import cost
 from training.networks.trainer import TrainingTask
+from training.run_log import known
 from training.telling import table_of
 
 _ABOUT = {
@@ -32,7 +33,7 @@ def finish_run(task: TrainingTask, settings: dict[str, Any], folder: Path, devic
     """Measure the network that `train` left, write report.json and NAME.safetensors; with `export` to the project."""
     task.net.eval()
     with torch.no_grad():
-        metrics = task.measure(device)
+        metrics = known(task.measure(device))
     work = cost(task.net)
     report = {"metrics": metrics, "cost": work, "settings": settings}
     write_atomically(folder / "report.json", json.dumps(report, indent=2) + "\n")
