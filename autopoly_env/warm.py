@@ -9,6 +9,7 @@ import argparse
 import contextlib
 import hashlib
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -16,26 +17,45 @@ import time
 from collections.abc import Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
+from typing import NoReturn
 
-import numpy as np
 
-from autopoly_env.compute import jit, n_threads
-from autopoly_env.details import hairlines
-from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import OPERATORS, legal_actions
-from autopoly_env.placement import Disagreement, tried
-from autopoly_env.raster import (
-    batch_of,
-    coverage,
-    coverage_many,
-    coverage_vjp,
-    loss_and_gradient,
-    loss_and_gradient_many,
-)
-from autopoly_env.refit import RefitTarget, mended, refit, tune
-from autopoly_env.score import ScoreWeights, score
-from autopoly_env.silhouette import Silhouette
-from autopoly_env.targets import ConstructionTargets
+@contextlib.contextmanager
+def _leaving_at_ctrl_c(is_command: bool) -> Iterator[None]:
+    """A context in which Ctrl-C ends the command at once, with a line: while it imports what it needs."""
+
+    def leave(*_: object) -> NoReturn:
+        os.write(2, b"error: stopped by Ctrl-C\n")
+        os._exit(130)
+
+    before = signal.signal(signal.SIGINT, leave) if is_command else None
+    try:
+        yield
+    finally:
+        if is_command:
+            signal.signal(signal.SIGINT, before)
+
+
+with _leaving_at_ctrl_c(__name__ == "__main__"):
+    import numpy as np
+
+    from autopoly_env.compute import jit, n_threads
+    from autopoly_env.details import hairlines
+    from autopoly_env.mesh import PolyMesh
+    from autopoly_env.operators import OPERATORS, legal_actions
+    from autopoly_env.placement import Disagreement, tried
+    from autopoly_env.raster import (
+        batch_of,
+        coverage,
+        coverage_many,
+        coverage_vjp,
+        loss_and_gradient,
+        loss_and_gradient_many,
+    )
+    from autopoly_env.refit import RefitTarget, mended, refit, tune
+    from autopoly_env.score import ScoreWeights, score
+    from autopoly_env.silhouette import Silhouette
+    from autopoly_env.targets import ConstructionTargets
 
 PARTS = {  # the longest first; those of the agents are named only, for this package knows none of them
     "refit": "autopoly_env.warm:refits",
