@@ -187,7 +187,7 @@ def check_env(env: Any, n_steps: int = 60, seed: int = 0) -> None:
     """Check of an AutoPoly environment, wrapped or not, what Gymnasium's own `check_env` does not.
 
     Rules: STOP is always legal; an action that the mask forbids is invalid and leaves the shape alone; one that has no
-    room leaves it alone, too, but is not invalid; infos have the same keys and types at every step;
+    room leaves it alone, too, but is not invalid; infos have the same keys, types, dtypes and shapes at every step;
     restoring a state and playing on gives the same trace, bit for bit, and so does a copy of the state from a pickle.
     """
     rng = np.random.default_rng(seed)
@@ -358,7 +358,7 @@ def _checked_step(env: Any, action: int, before: dict[str, Any], where: str) -> 
     _require(np.array_equal(mask == 1, env.unwrapped.action_masks()), f"{where}: action_masks() is not the info's mask")
     outcome = env.step(action)
     info = outcome[-1]
-    types = [{name: type(value) for name, value in one.items()} for one in (before, info)]
+    types = [{name: _type_of(value) for name, value in one.items()} for one in (before, info)]
     _require(types[0] == types[1], f"{where}: the infos have other keys or types than before")
     illegal = mask[action] == 0
     invalid = info["invalid_action"]
@@ -366,6 +366,11 @@ def _checked_step(env: Any, action: int, before: dict[str, Any], where: str) -> 
     _require(invalid == illegal, f"{where}: invalid_action is wrong about action {action}")
     _require(is_same or not illegal, f"{where}: an illegal action changed the shape")
     return tuple(outcome)
+
+
+def _type_of(value: Any) -> tuple[Any, ...]:
+    """What of a value vector environments take from the first one: its type, dtype and shape."""
+    return type(value), getattr(value, "dtype", None), getattr(value, "shape", None)
 
 
 def _comparable(outcome: Any) -> tuple[Any, ...]:

@@ -24,6 +24,7 @@ from autopoly_env.viewer import changed, draw_mesh
 REWARD_MODES = ("score", "improvement")
 RENDER_MODES = ("rgb_array", "ansi")
 RESET_OPTIONS = ("target", "mesh", "state")
+ENDS = ("", "stop", "matched", "max_steps")  # what `info["end"]` numbers
 _ANY_SHAPE = Silhouette(np.ones((8, 8), np.bool_))  # stands for the target while the rules are checked
 MOST_VERTICES = 10_000  # that arrays are padded to
 
@@ -95,6 +96,7 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
     - `faces`: the rule of faces that every mesh keeps: "any", "convex", "quads" (convex, 3 or 4 corners).
     - `max_steps`, `max_vertices`, `match_threshold`: see above.
     - `reward_mode`, `illegal_penalty`, `w_sm`, `w_sc`, `w_si`: see above.
+    - `info_texts`: whether infos also say in words what was done, why it is over and what the target is called.
     - `render_mode`: None, "rgb_array" or "ansi"; "human" through `gymnasium.make`. `render_size`: pixels.
 
     `reset(options=...)` takes `target` (an array, a path or a `Silhouette`), `mesh` (a `PolyMesh` to begin with), or
@@ -133,6 +135,7 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
         w_sm: float = 100.0,
         w_sc: float = 1.0,
         w_si: float = 5.0,
+        info_texts: bool = False,
         render_mode: str | None = None,
         render_size: int = 256,
     ) -> None:
@@ -154,6 +157,7 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
         self._rules = tuple((name, value) for name, value in rules.items() if name != "target")
         self._improvement = one_of("reward_mode", reward_mode, REWARD_MODES) == "improvement"
         self._illegal_penalty = number("illegal_penalty", illegal_penalty)
+        self._info_texts = one_of("info_texts", info_texts, (False, True))
         self.render_mode = one_of("render_mode", render_mode, (None, *RENDER_MODES))
         self._render_size = whole("render_size", render_size, 16, 4096)
         self.action_space = gymnasium.spaces.Discrete(self.codec.n_actions)
@@ -321,21 +325,25 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
         return self._observer.observe(state.mesh, self._picture, remaining)
 
     def _info(self) -> dict[str, Any]:
-        """One type per key, always: vector environments make arrays of them."""
+        """One dtype per key, always, and nothing but numbers unless texts are asked for: libraries make arrays of them.
+
+        A numpy scalar each, but for a 0-d array of bool: Gymnasium and torch take `np.bool_` for no number.
+        """
         episode, score = self._current(), self.state.score
-        return {
-            "r_sm": score.iou,
-            "r_sc": score.complexity,
-            "r_si": score.self_intersections,
-            "r_all": score.total,
-            "best_r_all": episode.best_r_all,
-            "n_refits": episode.state.n_refits,
-            "action": episode.action,
-            "invalid_action": episode.illegal,
-            "ended_by": episode.state.done,
-            "target": episode.silhouette.name,
+        info: dict[str, Any] = {
+            "r_sm": np.float64(score.iou),
+            "r_sc": np.int64(score.complexity),
+            "r_si": np.int64(score.self_intersections),
+            "r_all": np.float64(score.total),
+            "best_r_all": np.float64(episode.best_r_all),
+            "n_refits": np.int64(episode.state.n_refits),
+            "invalid_action": np.array(episode.illegal),
+            "end": np.int64(ENDS.index(episode.state.done)),
             "action_mask": self._legal_mask().astype(np.int8),
         }
+        if self._info_texts:
+            info |= {"action": episode.action, "ended_by": episode.state.done, "target": episode.silhouette.name}
+        return info
 
     def _index(self, action: Any) -> int:
         try:

@@ -6,14 +6,29 @@ import gymnasium
 import numpy as np
 from gymnasium.spaces import Box, Dict, Graph, GraphInstance
 from gymnasium.utils import RecordConstructorArgs
+from gymnasium.vector import VectorEnv
+from numpy.typing import DTypeLike
 
-from autopoly_env.arrays import AnyArray, ByteArray
+from autopoly_env.arrays import AnyArray, BoolArray, ByteArray
 from autopoly_env.env import AutoPolyEnv
 from autopoly_env.errors import ConfigError
 from autopoly_env.observation import POSITION_RANGE, Observation
+from autopoly_env.shown import short
 
 
-class FlatObservation(gymnasium.ObservationWrapper[Any, Any, Any], RecordConstructorArgs):
+class _Shown(gymnasium.ObservationWrapper[Any, Any, Any], RecordConstructorArgs):
+    """The environment with its observation in another form; `settings` are the wrapper's own arguments."""
+
+    def __init__(self, env: gymnasium.Env[Any, Any], **settings: Any) -> None:
+        RecordConstructorArgs.__init__(self, **settings)
+        gymnasium.ObservationWrapper.__init__(self, env)
+
+    def action_masks(self) -> BoolArray:
+        """(n_actions,) which actions are legal now."""
+        return _autopoly(self.env).action_masks()
+
+
+class FlatObservation(_Shown):
     """Everything as one vector of float32 in 0..1, for networks without convolutions.
 
     The arrays of the observation follow each other in the order of the space's keys, every one scaled from its bounds
@@ -21,8 +36,7 @@ class FlatObservation(gymnasium.ObservationWrapper[Any, Any, Any], RecordConstru
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
-        RecordConstructorArgs.__init__(self)
-        gymnasium.ObservationWrapper.__init__(self, env)
+        super().__init__(env)
         boxes = _boxes(env)
         self._names = list(boxes)
         self._low = np.concatenate([box.low.ravel().astype(np.float32) for box in boxes.values()])
@@ -34,28 +48,42 @@ class FlatObservation(gymnasium.ObservationWrapper[Any, Any, Any], RecordConstru
         return (values - self._low) / self._width
 
 
-class MaskInObservation(gymnasium.ObservationWrapper[Any, Any, Any], RecordConstructorArgs):
-    """The action mask as a further key `action_mask` (n_actions,) int8, for agents that see observations only.
+class MaskInObservation(_Shown):
+    """The action mask as a further key of the observation, for agents that see observations only.
 
-    What was a Dict keeps its keys; anything else becomes the key `observation`.
+    What was a Dict keeps its keys, and anything else becomes the key `observation`; with `observation_key` the whole
+    observation becomes that one key. The mask (n_actions,) is 1 where an action is legal, under `key` and as `dtype`:
+
+    - SB3 and PettingZoo's way: `MaskInObservation(env)`
+    - RLlib: `MaskInObservation(FlatObservation(env), observation_key="observations", dtype="float32")`
+    - Tianshou: `MaskInObservation(FlatObservation(env), "mask", "obs", bool)`
+
+    Raises ConfigError for a key that is there already, and for a dtype that is neither bool nor one of numbers.
     """
 
-    def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
-        RecordConstructorArgs.__init__(self)
-        gymnasium.ObservationWrapper.__init__(self, env)
-        n_actions = _autopoly(env).codec.n_actions
-        inner = env.observation_space
-        spaces: dict[str, gymnasium.Space[Any]] = (
-            dict(inner.spaces) if isinstance(inner, Dict) else {"observation": inner}
-        )
-        self.observation_space = Dict({**spaces, "action_mask": Box(0, 1, (n_actions,), np.int8)})
+    def __init__(
+        self,
+        env: gymnasium.Env[Any, Any],
+        key: str = "action_mask",
+        observation_key: str | None = None,
+        dtype: DTypeLike = np.int8,
+    ) -> None:
+        self._dtype = _mask_dtype(dtype)
+        super().__init__(env, key=key, observation_key=observation_key, dtype=self._dtype.name)
+        n_actions, inner = _autopoly(env).codec.n_actions, env.observation_space
+        self._key = key
+        self._whole = observation_key or (None if isinstance(inner, Dict) else "observation")
+        spaces = {self._whole: inner} if self._whole is not None else dict(inner.spaces)  # type: ignore[attr-defined]
+        if key in spaces:
+            raise ConfigError(f"the observation has a key {key!r} already; give the mask another one, key=...")
+        self.observation_space = Dict({**spaces, key: Box(0, 1, (n_actions,), self._dtype.type)})
 
     def observation(self, observation: Any) -> dict[str, Any]:
-        seen = observation if isinstance(observation, dict) else {"observation": observation}
-        return {**seen, "action_mask": _autopoly(self.env).action_masks().astype(np.int8)}
+        seen = observation if self._whole is None else {self._whole: observation}
+        return {**seen, self._key: self.action_masks().astype(self._dtype)}
 
 
-class GraphObservation(gymnasium.ObservationWrapper[Any, Any, Any], RecordConstructorArgs):
+class GraphObservation(_Shown):
     """The mesh as a graph of the size it has, beside the two pictures and the steps left: a Dict of
 
     - `graph`: a `GraphInstance` whose nodes are the V vertices and whose links (E, 2) are the E edges, in the order in
@@ -68,8 +96,7 @@ class GraphObservation(gymnasium.ObservationWrapper[Any, Any, Any], RecordConstr
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
-        RecordConstructorArgs.__init__(self)
-        gymnasium.ObservationWrapper.__init__(self, env)
+        super().__init__(env)
         boxes = _boxes(env)
         low, high = POSITION_RANGE
         node_low, node_high = np.array([low, low, 0, 0], np.float32), np.array([high, high, 1, 1], np.float32)
@@ -97,6 +124,28 @@ def _values_at(points: AnyArray, picture: ByteArray) -> AnyArray:
     columns, rows = np.floor(points * size).astype(np.int64).T
     inside = (columns >= 0) & (rows >= 0) & (columns < size) & (rows < size)
     return np.where(inside, picture[0, np.clip(rows, 0, size - 1), np.clip(columns, 0, size - 1)] / 255.0, 0.0)
+
+
+def action_masks(env: gymnasium.Env[Any, Any] | VectorEnv[Any, Any, Any]) -> BoolArray:
+    """(n_actions,), or (num_envs, n_actions) of a vector environment: which actions are legal now, however wrapped.
+
+    Gymnasium's vector wrappers pass no method on: `wrapped.action_masks()` is not there, `action_masks(wrapped)` is.
+    """
+    if isinstance(env, VectorEnv):
+        inner: Any = env.unwrapped
+        return np.stack(inner.call("action_masks"))
+    return _autopoly(env).action_masks()
+
+
+def _mask_dtype(dtype: DTypeLike) -> np.dtype[Any]:
+    """The dtype of a mask. Raises ConfigError for one that has no 0 and 1."""
+    try:
+        found = np.dtype(dtype)
+    except TypeError:
+        found = np.dtype(object)
+    if found.kind not in "biuf":
+        raise ConfigError(f"a mask of dtype {short(dtype)}: expected bool, or whole or real numbers, such as float32")
+    return found
 
 
 def _autopoly(env: gymnasium.Env[Any, Any]) -> AutoPolyEnv:

@@ -112,7 +112,7 @@ class TrainingEnv(gymnasium.Wrapper[Observation, Any, Observation, Any]):
         reward = self._reward_scale * points
         self._return += reward
         if terminated or truncated:
-            length = self._inner.state.step + (info["ended_by"] == "stop")
+            length = self._inner.state.step + (self._inner.state.done == "stop")
             info["episode"] = {"r": self._return, "l": length, "t": 0.0}
         return self._seen(observation, info), reward, terminated or truncated, False, info
 

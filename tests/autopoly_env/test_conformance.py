@@ -332,10 +332,10 @@ class Altered(gymnasium.Wrapper[Any, Any, Any, Any]):
 BROKEN_INFOS = {
     "forbids STOP": lambda info, n: info["action_mask"].__setitem__(0, 0),
     "is not the info's mask": lambda info, n: info["action_mask"].__setitem__(slice(1, None), 1),
-    "other keys or types": lambda info, n: info.update(r_sm=1),
-    "invalid_action is wrong": lambda info, n: info.update(invalid_action=not info["invalid_action"]),
-    "changed the shape": lambda info, n: info.update(r_all=float(n)),
-    "after a restore": lambda info, n: info.update(n_refits=n),
+    "other keys or types": lambda info, n: info.update(r_sm=np.int64(1)),
+    "invalid_action is wrong": lambda info, n: info.update(invalid_action=np.array(not info["invalid_action"])),
+    "changed the shape": lambda info, n: info.update(r_all=np.float64(n)),
+    "after a restore": lambda info, n: info.update(n_refits=np.int64(n)),
 }
 
 

@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from autopoly_env.env import ENDS
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.raster import coverage
 from tests.helpers.environments import BOX, begun, index_of, l_shape, make, play
@@ -64,19 +65,28 @@ def test_operators_that_would_overflow__are_masked() -> None:
 
 
 def test_infos__keep_one_type_per_key_and_say_what_happened() -> None:
-    env = make(max_steps=3)
+    env = make(max_steps=3, info_texts=False)
     _, first = env.reset(options={"target": l_shape(), "mesh": BOX})
-    assert (first["action"], first["ended_by"], first["invalid_action"]) == ("start", "", False)
+    assert (first["end"], first["invalid_action"]) == (0, False)
     seen = [first, *(step[-1] for step in play(env, 3, with_stop=False))]
     expected = {
-        "r_sm": float, "r_sc": int, "r_si": int, "r_all": float, "best_r_all": float, "n_refits": int, "action": str,
-        "invalid_action": bool, "ended_by": str, "target": str, "action_mask": np.ndarray,
+        "r_sm": (np.float64, "f8"), "r_sc": (np.int64, "i8"), "r_si": (np.int64, "i8"), "r_all": (np.float64, "f8"),
+        "best_r_all": (np.float64, "f8"), "n_refits": (np.int64, "i8"), "invalid_action": (np.ndarray, "?"),
+        "end": (np.int64, "i8"), "action_mask": (np.ndarray, "i1"),
     }  # fmt: skip
     for info in seen:
-        assert {key: type(value) for key, value in info.items()} == expected
+        assert {key: (type(value), value.dtype) for key, value in info.items()} == expected
         assert info["r_all"] == 100 * info["r_sm"] - info["r_sc"] - 5 * info["r_si"]
-    assert seen[-1]["ended_by"] == "max_steps"
+    assert ENDS[seen[-1]["end"]] == "max_steps"
     assert seen[-1]["best_r_all"] == max(info["r_all"] for info in seen)
+
+
+def test_texts__come_where_they_are_asked_for() -> None:
+    env = make()
+    _, info = env.reset(options={"target": l_shape(), "mesh": BOX})
+    assert (info["action"], info["ended_by"], info["target"]) == ("start", "", env.clone_state().silhouette.name)
+    *_, info = env.step(0)
+    assert (info["action"], info["ended_by"]) == ("stop", "stop")
 
 
 def test_words__name_elements_by_their_ids() -> None:

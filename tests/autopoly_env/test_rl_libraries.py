@@ -91,3 +91,24 @@ def test_ppo__trains_on_the_flat_observation_in_a_vectorised_env() -> None:
     model = sb3.PPO("MlpPolicy", envs, n_steps=100, batch_size=100, n_epochs=1, policy_kwargs={"net_arch": [8]})
     model.learn(200)
     assert model.num_timesteps == 200
+
+
+@pytest.mark.parametrize("kind", ["single", "native", "sync"])
+def test_gymnasiums_numpy_to_torch__carries_all_of_the_info(kind: str) -> None:
+    torch = pytest.importorskip("torch")
+    pytest.importorskip("array_api_compat", reason="needs array-api-compat (pip install -e '.[dev]')")
+    from gymnasium.wrappers import NumpyToTorch
+    from gymnasium.wrappers.vector import NumpyToTorch as VectorNumpyToTorch
+
+    mode = {"native": "vector_entry_point"}.get(kind, kind)
+    name, settings = "autopoly_env:AutoPoly-v0", {**SMALL, "max_steps": 2}
+    if kind == "single":
+        env: Any = NumpyToTorch(gymnasium.make(name, **settings))
+    else:
+        env = VectorNumpyToTorch(gymnasium.make_vec(name, num_envs=2, vectorization_mode=mode, **settings))
+    _, info = env.reset(seed=0)
+    assert all(isinstance(value, torch.Tensor) for value in info.values())
+    assert info["invalid_action"].dtype == torch.bool and info["end"].dtype == torch.int64
+    for _ in range(1 if kind == "single" else 4):  # an end and a reset among them
+        *_, info = env.step(torch.ones(() if kind == "single" else (2,), dtype=torch.int64))
+        assert all(isinstance(value, torch.Tensor) for value in info.values())

@@ -112,7 +112,10 @@ def test_same_step_mode__shows_the_last_observation_in_the_info() -> None:
     seen, rewards, terminated, _, infos = envs.step(np.array([0, 1]))
     assert terminated.tolist() == [True, False]
     assert infos["_final_obs"].tolist() == [True, False]
-    assert infos["final_info"]["action"][0] == "stop" and infos["action"][0] == "start"
+    assert infos["final_info"]["end"].tolist() == [1, 0] and infos["end"].tolist() == [0, 0]
+    assert {key: value.dtype.kind for key, value in infos["final_info"].items()} == {
+        key: infos[key].dtype.kind for key in infos["final_info"]
+    }
     assert rewards[0] == infos["final_info"]["r_all"][0]
     assert seen["remaining_steps"].tolist() == [[6], [5]]
 
@@ -171,9 +174,12 @@ def test_every_key_of_the_infos__has_one_type_for_all() -> None:
     envs = native(2)
     _, first = envs.reset(seed=0)
     _, _, _, _, second = envs.step([1, 2])
-    types = {"r_sm": "f8", "r_sc": "i8", "r_all": "f8", "invalid_action": "?", "action": "O", "action_mask": "i1"}
+    types = {"r_sm": "f8", "r_sc": "i8", "r_si": "i8", "r_all": "f8", "best_r_all": "f8", "n_refits": "i8"}
+    types |= {"invalid_action": "?", "end": "i8", "action_mask": "i1"}
     for infos in (first, second):
-        assert {key: infos[key].dtype for key in types} == {key: np.dtype(name) for key, name in types.items()}
+        assert {key: infos[key].dtype for key in infos if key[0] != "_"} == {
+            key: np.dtype(name) for key, name in types.items()
+        }
 
 
 def test_reset_with_a_seed__is_the_same_after_a_step_that_broke_off() -> None:

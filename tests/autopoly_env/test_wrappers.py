@@ -1,22 +1,35 @@
 """Wrappers: the same observation as a vector, with the mask in it, as a graph."""
 
 import pickle
+import re
 import warnings
 from typing import Any
 
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env
+from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
 from autopoly_env.conformance import check_env as check_autopoly_env
 from autopoly_env.env import AutoPolyEnv
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.wrappers import FlatObservation, GraphObservation, MaskInObservation
+from autopoly_env.wrappers import FlatObservation, GraphObservation, MaskInObservation, action_masks
 
 SMALL: dict[str, Any] = {"resolution": 16, "obs_resolution": 16, "max_vertices": 9, "max_steps": 10}
-ALL = [FlatObservation, MaskInObservation, GraphObservation, lambda env: MaskInObservation(FlatObservation(env))]
+
+
+def rllib(env: Any) -> MaskInObservation:
+    return MaskInObservation(FlatObservation(env), observation_key="observations", dtype="float32")
+
+
+def tianshou(env: Any) -> MaskInObservation:
+    return MaskInObservation(FlatObservation(env), "mask", "obs", bool)
+
+
+ALL = [FlatObservation, MaskInObservation, GraphObservation, rllib, tianshou]
 
 
 def disc() -> np.ndarray:
@@ -69,8 +82,45 @@ def test_mask__is_a_key_beside_the_others_or_beside_the_vector() -> None:
     np.testing.assert_array_equal(seen["action_mask"], env.unwrapped.action_masks())
     assert seen["action_mask"].dtype == np.int8
     assert seen.keys() == {*env.env.observation_space.spaces, "action_mask"}
-    _, seen = begun(ALL[-1])
+    _, seen = begun(lambda env: MaskInObservation(FlatObservation(env)))
     assert seen.keys() == {"observation", "action_mask"}
+
+
+def test_mask__is_where_the_library_looks_in_its_dtype() -> None:
+    for wrap, keys, dtype in ((rllib, ("observations", "action_mask"), "float32"), (tianshou, ("obs", "mask"), "bool")):
+        env, seen = begun(wrap)
+        assert tuple(seen) == keys and seen[keys[1]].dtype == dtype
+        np.testing.assert_array_equal(seen[keys[1]] == 1, env.action_masks())
+        assert seen in env.observation_space
+    env, seen = begun(lambda env: MaskInObservation(env, observation_key="everything"))
+    assert seen.keys() == {"everything", "action_mask"} and seen["everything"].keys() > {"vertices", "edges"}
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"key": "edges"}, "the observation has a key 'edges' already; give the mask another one, key=..."),
+        ({"observation_key": "action_mask"}, "the observation has a key 'action_mask' already"),
+        ({"dtype": "U1"}, "a mask of dtype 'U1': expected bool, or whole or real numbers"),
+        ({"dtype": complex}, "a mask of dtype <class 'complex'>: expected bool"),
+        ({"dtype": "nonsense"}, "a mask of dtype 'nonsense': expected bool"),
+    ],
+)
+def test_mask_that_cannot_be_there__is_refused(settings: dict[str, Any], message: str) -> None:
+    with pytest.raises(ConfigError, match=re.escape(message)):
+        MaskInObservation(AutoPolyEnv(**SMALL), **settings)
+
+
+@pytest.mark.parametrize("kind", ["native", "sync"])
+def test_masks__are_read_through_gymnasiums_vector_wrappers(kind: str) -> None:
+    mode = "vector_entry_point" if kind == "native" else kind
+    envs = gymnasium.make_vec("autopoly_env:AutoPoly-v0", num_envs=2, vectorization_mode=mode, **SMALL)
+    wrapped = RecordEpisodeStatistics(envs)
+    _, infos = wrapped.reset(seed=0)
+    np.testing.assert_array_equal(action_masks(wrapped), infos["action_mask"] == 1)
+    env = gymnasium.make("autopoly_env:AutoPoly-v0", **SMALL)
+    _, info = env.reset(seed=0)
+    np.testing.assert_array_equal(action_masks(env), info["action_mask"] == 1)
 
 
 def test_graph__has_the_vertices_and_edges_of_the_mesh() -> None:
@@ -109,7 +159,8 @@ def test_wrapping_another_form_of_the_observation__is_refused(wrap: Any) -> None
 
 
 def test_wrappers__can_be_made_again_from_the_spec() -> None:
-    env = MaskInObservation(gymnasium.make("autopoly_env:AutoPoly-v0", **SMALL))
+    env = rllib(gymnasium.make("autopoly_env:AutoPoly-v0", **SMALL))
     assert env.spec is not None
-    again = gymnasium.make(env.spec)
+    again = gymnasium.make(EnvSpec.from_json(env.spec.to_json()))
+    assert again.observation_space == env.observation_space
     assert again.reset(seed=1)[0].keys() == env.reset(seed=1)[0].keys()

@@ -23,7 +23,8 @@ def l_shape(size: int = 32) -> np.ndarray:
 
 
 def make(**settings: Any) -> AutoPolyEnv:
-    return AutoPolyEnv(**{**SMALL, **settings})
+    """One whose infos also speak in words, unless the settings say otherwise."""
+    return AutoPolyEnv(**{**SMALL, "info_texts": True, **settings})
 
 
 def begun(**settings: Any) -> AutoPolyEnv:
