@@ -19,6 +19,7 @@ Examples:
   python -m training.make_dataset constructions --n 100000 --out data/train
   python -m training.make_dataset constructions --n 1000 --split validation --difficulty 3-5 --out data/validation
   python -m training.make_dataset objects --n 5000 --resolution 256 --out data/objects
+  python -m training.make_dataset minari --n 100 --agent mcts --name autopoly/mcts-v0 --out data/minari
   python -m training.make_dataset verify data/train
   python -m training.make_dataset silhouettes chair.obj lamp.glb --view front --out data/models
   python -m training.make_dataset silhouettes ShapeNetCore.v2 --categories chair,lamp --split test --out data/shapenet
@@ -101,6 +102,37 @@ def objects(
     settings = DatasetSettings("objects", split, seed, resolution, families=families)
     machines = {"engine": engine, "n_workers": workers, "address": ray_address}
     return _build(settings, out, n, shard_size, machines, resume, fresh, quiet)
+
+
+@app.command()
+def minari(
+    n: Annotated[int, typer.Option("--n", help="How many episodes.")],
+    out: Annotated[Path, typer.Option(help="Folder of Minari's data sets.")],
+    name: Annotated[str, typer.Option(help="Of the data set, NAMESPACE/NAME-vN.")] = "autopoly/play-v0",
+    agent: Annotated[str, typer.Option(help="Who plays.")] = "greedy",
+    option: Annotated[list[str] | None, typer.Option(help="KEY=VALUE of the agent.")] = None,
+    env: Annotated[str, typer.Option(help="AutoPoly-v0, AutoPolyObjects-v0 or AutoPolyFolder-v0.")] = "AutoPoly-v0",
+    env_option: Annotated[list[str] | None, typer.Option(help="KEY=VALUE of the environment.")] = None,
+    seed: Annotated[int, typer.Option(help="Of the first episode; the others follow.")] = 0,
+    quiet: Quiet = False,
+) -> int:
+    """Record an agent's play in an environment, with the masks, as a data set of Minari."""
+    from agents.options import put_override
+    from agents.registry import make_agent
+    from training.datasets.plays import PlaySettings, record_plays
+
+    arguments: dict[Any, Any] = {}
+    for text in env_option or []:
+        put_override(arguments, text, "--env-option", "resolution=64")
+    options: dict[Any, Any] = {}
+    for text in option or []:
+        put_override(options, text, "--option", "n_simulations=200")
+    settings = PlaySettings(name, n, env, tuple(arguments.items()), seed)
+    player = make_agent(agent, **options)
+    with progress_bar(n, is_hidden=quiet, shows_left=True) as bar:
+        record_plays(out, settings, player, lambda: bar.advance(TASK))
+    print(f"{out}: {n} episodes of {agent} as {name}; read them with minari.load_dataset({name!r})")
+    return 0
 
 
 @app.command()
