@@ -89,7 +89,7 @@ def tried(name: str) -> tuple[str, bool]:
             python = installed(Path(folder) / "venv", RECIPES / "requirements" / f"{library.requirements}.txt")
             watch = [python, "-m", "benchmarks.rl_watch", f"examples.rl.{library.recipe}", *library.distributions]
             told = run(watch, {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1", "HOME": folder}).splitlines()
-            counts = json.loads(told[-1])
+            counts = json.loads([line for line in told if line.startswith("{")][-1])
         except (subprocess.SubprocessError, ValueError, IndexError, OSError) as error:
             problem = getattr(error, "stderr", None) or str(error)
             return f"{start.format('?')} {str(problem).strip().splitlines()[-1][:160]} | | |", False
@@ -104,8 +104,8 @@ def installed(folder: Path, requirements: Path) -> Path:
     venv.create(folder, with_pip=True)
     python = folder / "bin" / "python"
     uv = shutil.which("uv")
-    command = [uv, "pip", "install", "--python", python] if uv else [python, "-m", "pip", "install"]
-    run([*map(str, command), "--quiet", "-e", str(ROOT), "-r", str(requirements)], {})
+    command: list[str | Path] = [uv, "pip", "install", "--python", python] if uv else [python, "-m", "pip", "install"]
+    run([*command, "--quiet", "-e", ROOT, "-r", requirements], {})
     return python
 
 

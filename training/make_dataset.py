@@ -123,10 +123,10 @@ def minari(
 
     arguments: dict[Any, Any] = {}
     for text in env_option or []:
-        put_override(arguments, text, "--env-option", "resolution=64")
+        put_override(arguments, text, f"--env-option {text}", "resolution=64")
     options: dict[Any, Any] = {}
     for text in option or []:
-        put_override(options, text, "--option", "n_simulations=200")
+        put_override(options, text, f"--option {text}", "width=4")
     settings = PlaySettings(name, n, env, tuple(arguments.items()), seed)
     player = make_agent(agent, **options)
     with progress_bar(n, is_hidden=quiet, shows_left=True) as bar:

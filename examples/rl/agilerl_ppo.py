@@ -11,9 +11,8 @@ from agilerl.rollouts import collect_rollouts
 from examples.rl.measuring import N_STEPS, NAME, SETTINGS, r_all_of
 
 envs = gymnasium.make_vec(NAME, num_envs=8, **SETTINGS)
-agent = PPO(
-    envs.single_observation_space, envs.single_action_space, num_envs=8, learn_step=N_STEPS // 8, batch_size=128
-)
+spaces = envs.single_observation_space, envs.single_action_space
+agent = PPO(*spaces, num_envs=8, learn_step=N_STEPS // 8, batch_size=128)
 
 
 def act(observation, mask):

@@ -21,9 +21,8 @@ make_dataset(["minari", "--n=60", "--agent=greedy", f"--name={name}", f"--out={f
 dataset = load_plays(folder, name)
 env, episodes = dataset.recover_environment(), list(dataset)
 keys = list(env.unwrapped.observation_space)
-seen = {
-    key: torch.cat([torch.from_numpy(e.observations[key][:-1]) for e in episodes]) for key in [*keys, "action_mask"]
-}
+parts = {key: [torch.from_numpy(e.observations[key][:-1]) for e in episodes] for key in env.observation_space}
+seen = {key: torch.cat(arrays) for key, arrays in parts.items()}
 actions = torch.cat([torch.from_numpy(e.actions) for e in episodes])
 net = Net(env.unwrapped.observation_space, env.action_space.n)
 optimiser = torch.optim.Adam(net.parameters(), 1e-3)

@@ -34,11 +34,11 @@ def learned(n_learner_steps):
     with tempfile.TemporaryDirectory() as folder:
         settings = GMZConfig(
             batch_size=64,
-            min_replay_size=256,
-            max_replay_size=8192,
+            num_simulations=8,
             num_unroll_steps=2,
             num_bootstrapping=3,
-            num_simulations=8,
+            min_replay_size=256,
+            max_replay_size=8192,
         )
         experiment = ExperimentConfig(
             config=settings.with_size("XS").with_num_steps(n_learner_steps),

@@ -1,6 +1,6 @@
 """Data sets of play in the format of Minari: what an agent did in an environment, with the masks of what it might do.
 
-They are read with Minari alone: `minari.load_dataset(NAME)` gives the episodes, `recover_environment()` the environment.
+Minari alone reads them: `minari.load_dataset(NAME)` gives the episodes, `recover_environment()` the environment.
 """
 
 import os
@@ -38,8 +38,8 @@ def record_plays(
 ) -> None:
     """Let the agent play `n` episodes and write them below `folder` as a Minari data set; all or nothing.
 
-    An action that the environment's arrays have no room for is STOP. Raises ConfigError for settings out of range, where
-    Minari is not installed and where there is such a data set, OutputError where nothing can be written.
+    An action that the environment's arrays have no room for is STOP. Raises ConfigError for settings out of range,
+    where Minari is not installed and where there is such a data set, OutputError where nothing can be written.
     """
     minari = _minari(folder)
     if settings.n < 1:
@@ -52,7 +52,7 @@ def record_plays(
         recorder = minari.DataCollector(env, record_infos=True, jpeg_encoding=False)  # JPEG is not what was seen
         for k in range(settings.n):
             recorder.reset(seed=settings.seed + k)
-            for action in _played(env.unwrapped, agent):  # type: ignore[arg-type]
+            for action in _played(env.unwrapped, agent):
                 recorder.step(action)
             on_episode()
         with warnings.catch_warnings():
