@@ -10,6 +10,7 @@ import pickle
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import wraps
 from pathlib import Path
 from typing import Any, ParamSpec
@@ -84,8 +85,9 @@ def check_simulator(simulator: Simulator, n_steps: int = 30, seed: int = 0) -> N
 
     Rules: STOP is legal until the end, nothing after it; every action it calls legal works or has no room, another
     raises IllegalActionError; no transition brings a crossing, or a flipped or empty face; the same state and action
-    give the same state, alone and in `transition_all`; a transition leaves the state it starts from as it was, and its
-    refits are counted; scores are those of the meshes; states pickle; `max_steps` is kept, and so is the rule of faces.
+    give the same state, alone, in `transition_all` and in `step_many`; a transition leaves the state it starts from as
+    it was, and its refits are counted; scores are those of the meshes; states pickle; `max_steps` is kept, and so is
+    the rule of faces.
     """
     rng = np.random.default_rng(seed)
     state = simulator.initial()
@@ -344,6 +346,9 @@ def _checked_transition(simulator: Simulator, state: State, action: Any, where: 
     _require(is_valid(after.mesh), f"{where} gives a mesh that is not valid")
     _require(not broken_faces(after.mesh, simulator.faces), f"{where} breaks the rule of faces")
     _require(bool(after.done) or after.step < simulator.max_steps, f"{where}: max_steps is not kept")
+    (stepped, refused) = simulator.step_many([state, replace(state, done="stop")], [action, action])
+    _require(stepped is not None and _same_state(after, stepped), f"{where} gives another state in step_many")
+    _require(refused is None, f"{where}: step_many goes on from a state that is over")
     return after
 
 

@@ -14,7 +14,7 @@ import shapely
 
 from autopoly_env.arguments import number, whole
 from autopoly_env.arrays import BoolArray, FloatArray
-from autopoly_env.compute import Job, Routine, map_threads, run
+from autopoly_env.compute import Job, Routine, map_threads, run, run_all
 from autopoly_env.details import Details, hairlines
 from autopoly_env.errors import ConfigError, IllegalActionError, MeshError
 from autopoly_env.guidance import MOST_CORNERS, Guidance, ImportanceSource, importance_settings, weighted
@@ -326,6 +326,26 @@ class Simulator:
         made = map_threads(lambda trial: run(self._refitted(state, trial)), trials)
         self.n_refits += sum(after.n_refits for after in made)
         return [after for after in made if _is_as_sane(after, disagreement)]
+
+    def legal_many(self, states: Sequence[State]) -> list[list[Action]]:
+        """`legal_actions` of each of the states."""
+        return [self.legal_actions(state) for state in states]
+
+    def step_many(self, states: Sequence[State], actions: Sequence[Action]) -> list[State | None]:
+        """`transition` of each state with its action, all at once on all cores; None where it would be refused.
+
+        That is where the state is over, the action is illegal, or it proves to have no room; the refits of the last
+        count all the same. Raises ConfigError unless there are as many actions as states.
+        """
+        if len(states) != len(actions):
+            raise ConfigError(f"{len(states)} states and {len(actions)} actions: expected as many of both")
+        return run_all(self._unless_refused(*pair) for pair in zip(states, actions, strict=True))
+
+    def _unless_refused(self, state: State, action: Action) -> Routine[State | None]:
+        try:
+            return (yield from self.transition_routine(state, action))
+        except IllegalActionError:
+            return None
 
     def _check_operator(self, action: Action) -> None:
         if action.operator not in self.operators:

@@ -87,7 +87,7 @@ def tried(name: str) -> tuple[str, bool]:
     with tempfile.TemporaryDirectory() as folder:
         try:
             python = installed(Path(folder) / "venv", RECIPES / "requirements" / f"{library.requirements}.txt")
-            watch = [python, "-m", "benchmarks.rl_watch", f"examples.rl.{library.recipe}", *library.distributions]
+            watch = [str(python), "-m", "benchmarks.rl_watch", f"examples.rl.{library.recipe}", *library.distributions]
             told = run(watch, {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1", "HOME": folder}).splitlines()
             counts = json.loads([line for line in told if line.startswith("{")][-1])
         except (subprocess.SubprocessError, ValueError, IndexError, OSError) as error:
@@ -101,18 +101,18 @@ def tried(name: str) -> tuple[str, bool]:
 
 def installed(folder: Path, requirements: Path) -> Path:
     """The Python of a new environment with what a file asks for, and this checkout's own needs."""
-    venv.create(folder, with_pip=True)
-    python = folder / "bin" / "python"
     uv = shutil.which("uv")
-    command: list[str | Path] = [uv, "pip", "install", "--python", python] if uv else [python, "-m", "pip", "install"]
-    run([*command, "--quiet", "-e", ROOT, "-r", requirements], {})
+    venv.create(folder, with_pip=uv is None)
+    python = folder / "bin" / "python"
+    command = [uv, "pip", "install", "--python", str(python)] if uv else [str(python), "-m", "pip", "install"]
+    run([*command, "--quiet", "-e", str(ROOT), "-r", str(requirements)], {})
     return python
 
 
-def run(command: Sequence[str | Path], environment: dict[str, str]) -> str:
+def run(command: Sequence[str], environment: dict[str, str]) -> str:
     """What a command prints. Raises CalledProcessError where it fails, TimeoutExpired where it does not end."""
     done = subprocess.run(
-        [str(part) for part in command],
+        command,
         cwd=ROOT,
         env=os.environ | environment,
         capture_output=True,

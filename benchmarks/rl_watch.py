@@ -1,7 +1,7 @@
 """Runs one recipe of examples/rl and counts what it does: `python -m benchmarks.rl_watch MODULE VERSIONS_OF ...`.
 
 It runs in the library's own installation, so it imports nothing but the environment, and counts there, in every step
-that is taken: what the recipe, or its library, says of itself does not matter. JSON is the last thing that it prints itself.
+that is taken: what the recipe, or its library, says of itself does not matter. It ends with a line of JSON.
 """
 
 import json

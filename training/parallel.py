@@ -5,16 +5,20 @@ result depends on its task only; a task that needs random numbers carries its se
 """
 
 import contextlib
+import heapq
+import itertools
 import multiprocessing
 import multiprocessing.resource_tracker
 import os
 import pickle
+import re
 import signal
 import subprocess
 import sys
 import threading
+import time
 import traceback
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection, wait
@@ -32,6 +36,9 @@ N_TRIES = 2  # of a task whose worker dies
 DYING = 10.0  # seconds that a process may take to end after it has closed its pipe
 RAY_PATIENCE = 12.0  # seconds to wait for a cluster's answer
 RAY_AHEAD = 8  # tasks a CPU that Ray is given ahead, so that no CPU waits for us
+N_LOSSES = 30  # of one task's workers to the system (a node that dies, memory that runs out), before it is given up
+RAY_PAUSE = 1.0  # seconds more before each next try of a task that was lost, as memory comes back slowly
+MOST_PAUSE = 15.0  # seconds
 # One thread a worker: as many workers as cores, each with a pool of its own, get in each other's way.
 ONE_THREAD = dict.fromkeys(
     ("AUTOPOLY_THREADS", "NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"
@@ -53,6 +60,7 @@ class _Job(Generic[Task]):
 
     task: Task
     n_deaths: int = 0  # of workers that had it
+    n_losses: int = 0  # of workers that had it and were lost to the system, which is no fault of the task
 
 
 def map_tasks(
@@ -67,8 +75,9 @@ def map_tasks(
     """Apply `function` to all tasks; yield each as it is done, in any order.
 
     `tasks` is read only as fast as workers take them. What the function raises becomes the `error` of its task; a task
-    whose worker dies is tried once more, then it fails, too; the others go on. `on_start` is called with every task
-    that a worker is given. Closing the iterator stops the workers.
+    whose worker dies is tried once more, then it fails, too; the others go on. What Ray loses for reasons of its own
+    (a node that dies, memory that runs out) is tried again until it is done. `on_start` is called with every task that
+    a worker is given. Closing the iterator stops the workers.
 
     engine: "serial", in this process; "process", `n_workers` processes (default: as many as cores), one thread each;
     "ray", a Ray cluster at `address` ("auto", "host:port"), or one started here with `n_workers` CPUs. Functions and
@@ -126,6 +135,14 @@ def _after_death(job: _Job[Task], reason: str) -> tuple[_Job[Task], Done[Task, A
     if job.n_deaths < N_TRIES:
         return job, None
     return job, Done(job.task, None, f"its worker died {job.n_deaths} times ({reason})")
+
+
+def _after_loss(job: _Job[Task], reason: str) -> tuple[_Job[Task], Done[Task, Any] | None]:
+    """The job to try again, or its end where it has been lost far too often."""
+    job = replace(job, n_losses=job.n_losses + 1)
+    if job.n_losses < N_LOSSES:
+        return job, None
+    return job, Done(job.task, None, f"its worker was lost to the system {job.n_losses} times ({reason})")
 
 
 def _serial(
@@ -310,11 +327,26 @@ def _check_ray(address: str) -> None:
     probe = [sys.executable, "-c", "import sys, ray; ray.init(sys.argv[1], log_to_driver=False)", address]
     try:
         answer = subprocess.run(probe, capture_output=True, text=True, timeout=RAY_PATIENCE)
-        reason = answer.stderr.strip().splitlines()[-1] if answer.returncode else ""
-    except subprocess.TimeoutExpired:
-        reason = f"nothing within {RAY_PATIENCE:g} seconds"
-    if reason:
-        raise ConfigError(f"no Ray cluster answers at {address!r} ({reason}); start one with `ray start --head`")
+        if not answer.returncode:
+            return
+        said, reason = answer.stderr, answer.stderr.strip().splitlines()[-1]
+    except subprocess.TimeoutExpired as late:  # what it says is bytes, whatever `text` was
+        said, reason = (late.stderr or b"").decode(errors="replace"), f"nothing within {RAY_PATIENCE:g} seconds"
+    raise ConfigError(_why_no_ray(address, said, reason))
+
+
+def _why_no_ray(address: str, said: str, reason: str) -> str:
+    """What keeps us from the cluster at an address, and what to do, from what Ray `said` and the last of it."""
+    if "InvalidAuthToken" in said or "AuthenticationError" in said:
+        return (
+            f"the Ray cluster at {address!r} wants another token: start it, its nodes and this command with the same "
+            "~/.ray/auth_token or RAY_AUTH_TOKEN and RAY_AUTH_MODE=token, or all of them with RAY_AUTH_MODE=disabled"
+        )
+    versions = re.findall(r"(?:Ray|Python): ([\w.+]+)", said) if "Version mismatch" in said else []
+    if versions:
+        theirs, ours = (f"Ray {ray} and Python {python}" for ray, python in (versions[:2], versions[-2:]))
+        return f"the Ray cluster at {address!r} runs {theirs}, this process {ours}: install the same on both"
+    return f"no Ray cluster answers at {address!r} ({reason}); start one with `ray start --head`"
 
 
 def _ray(
@@ -329,6 +361,8 @@ def _ray(
     sent = ray.put(function)
     jobs = (_Job(task) for task in tasks)
     running: dict[Any, _Job[Task]] = {}
+    lost: list[tuple[float, int, _Job[Task]]] = []  # when to try again, a number that no two have, what
+    numbers = itertools.count()
 
     def submit(job: _Job[Task] | None) -> None:
         if job is not None:
@@ -338,16 +372,41 @@ def _ray(
     try:
         for _ in range(n_under_way):
             submit(next(jobs, None))
-        while running:
-            (ready,), _ = ray.wait(list(running))
-            job = running.pop(ready)
-            done: Done[Task, Value] | None
-            try:
-                done = Done(job.task, *ray.get(ready))
-            except ray.exceptions.RayError as error:
-                job, done = _after_death(job, type(error).__name__)
-            submit(job if done is None else next(jobs, None))
-            if done is not None:
-                yield done
+        while running or lost:
+            while lost and lost[0][0] <= time.monotonic():
+                submit(heapq.heappop(lost)[2])
+            ready, _ = ray.wait(list(running), timeout=_until(lost)) if running else _slept(lost)
+            for reference in ready:
+                job = running.pop(reference)
+                done: Done[Task, Value] | None
+                try:
+                    done = Done(job.task, *ray.get(reference))
+                except (ray.exceptions.WorkerCrashedError, ray.exceptions.RayTaskError) as error:
+                    job, done = _after_death(job, type(error).__name__)
+                    if done is None:
+                        submit(job)
+                except ray.exceptions.RayError as error:
+                    job, done = _after_loss(job, type(error).__name__)
+                    if done is None:
+                        heapq.heappush(lost, (time.monotonic() + _pause(job), next(numbers), job))
+                if done is not None:
+                    submit(next(jobs, None))
+                    yield done
     finally:
         ray.shutdown()
+
+
+def _pause(job: _Job[Any]) -> float:
+    """Seconds until a lost task is tried again: none after its first loss, then more and more."""
+    return min(MOST_PAUSE, RAY_PAUSE * (job.n_losses - 1))
+
+
+def _until(lost: Sequence[tuple[float, int, Any]]) -> float | None:
+    """Seconds until the first of the lost tasks is due, None where there is none."""
+    return max(0.0, lost[0][0] - time.monotonic()) if lost else None
+
+
+def _slept(lost: Sequence[tuple[float, int, Any]]) -> tuple[list[Any], list[Any]]:
+    """Nothing, once the first of the lost tasks is due."""
+    time.sleep(_until(lost) or 0.0)
+    return [], []

@@ -4,6 +4,7 @@ pip install -e . -r examples/rl/requirements/rllib.txt
 python -m examples.rl.rllib_ppo
 """
 
+import ray
 import torch
 from ray.rllib.algorithms.ppo import PPOConfig
 from ray.rllib.core.rl_module import RLModuleSpec
@@ -18,6 +19,7 @@ def wrap(env):
     return MaskInObservation(FlatObservation(env), observation_key="observations", dtype="float32")
 
 
+ray.init("local", include_dashboard=False)  # whatever cluster there is on this machine
 register_env("masked", lambda config: wrap(make()))
 spec = RLModuleSpec(module_class=ActionMaskingTorchRLModule, model_config={"fcnet_hiddens": [128]})
 config = PPOConfig().environment("masked").env_runners(num_env_runners=0).rl_module(rl_module_spec=spec)

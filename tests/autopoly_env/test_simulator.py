@@ -318,6 +318,29 @@ def test_transition_all__keeps_the_order_it_is_given_and_leaves_out_stop() -> No
     assert [child.action for child in children] == [given[0], given[2], given[3]]
 
 
+@pytest.mark.parametrize("n_threads", [1, 2])
+def test_step_many__is_bit_for_bit_the_transitions_one_by_one(n_threads: int) -> None:
+    set_threads(n_threads)
+    game = simulator(HOUSE)
+    start = game.initial()
+    going = [state for state in game.transition_all(start) if not state.done]
+    states = [start, *going[:4], game.transition(start, STOP)]
+    actions = [*(actions[-1] for actions in game.legal_many(states[:-1])), STOP]
+    before = game.n_refits
+    stepped = game.step_many(states, actions)
+    n_refits = game.n_refits - before
+    assert stepped[-1] is None and game.legal_many(states)[-1] == []  # it was over
+    expected = [game.transition(state, action) for state, action in zip(states[:-1], actions[:-1], strict=True)]
+    for state, other in zip(stepped[:-1], expected, strict=True):
+        assert state is not None
+        assert_same(state, other)
+    assert n_refits == sum(state.n_refits for state in expected)
+    assert game.step_many([start, start], [Action("face_split", 99), STOP])[0] is None
+    assert game.step_many([], []) == []
+    with pytest.raises(ConfigError, match="2 states and 1 actions"):
+        game.step_many([start, start], [STOP])
+
+
 def test_transition_all__leaves_out_what_has_no_room() -> None:
     game = simulator(HOUSE)
     state = game.initial(TWO_FACES)

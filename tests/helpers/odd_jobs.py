@@ -28,6 +28,11 @@ def _die_once(flag: str) -> str:
     return "survived"
 
 
+def _slow_square(x: int) -> int:
+    time.sleep(0.5)
+    return x * x
+
+
 def _threads(_: None) -> tuple[str, int]:
     import torch
 
@@ -42,6 +47,7 @@ def _linger(pid_file: str) -> None:
 
 JOBS: dict[str, Callable[[Any], Any]] = {
     "square": lambda x: x * x,
+    "slow square": _slow_square,
     "fail": _fail,
     "exit": os._exit,
     "die once": _die_once,

@@ -9,7 +9,10 @@ import pytest
 from PIL import Image
 from skimage.measure import label
 
+from autopoly_env.silhouette import load_silhouette
+from autopoly_env.simulator import Simulator
 from examples import draw_examples
+from examples.alphazero_search import search
 from tests.helpers.environments import play
 from tests.helpers.paths import ROOT
 
@@ -75,3 +78,18 @@ def test_agent_in_fifteen_lines__beats_random_play(capsys: pytest.CaptureFixture
         _, start = env.reset(seed=seed)
         at_random.append(play(env, 20, seed)[-1][-1]["best_r_all"] - start["r_all"])
     assert np.mean(gains) > 2.0 * np.mean(at_random)
+
+
+@pytest.mark.slow
+def test_alphazero_search__leads_to_what_it_says_and_is_worth_it() -> None:
+    simulator = Simulator(load_silhouette(EXAMPLES / "mug.png"), resolution=64, max_steps=10)
+    best, actions = search(simulator, 200)
+    state = simulator.initial()
+    begun = state.score.total
+    for action in actions:
+        state = simulator.transition(state, action)
+    assert state.score == best.score and best.score.total > begun + 5.0
+
+
+def test_alphazero_search__fits_on_a_page() -> None:
+    assert len((EXAMPLES / "alphazero_search.py").read_text(encoding="utf-8").splitlines()) <= 100

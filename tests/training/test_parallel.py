@@ -174,6 +174,62 @@ def test_ray_address__where_nobody_answers_is_one_line_soon(monkeypatch: pytest.
         map_tasks(do, SQUARES, engine="ray", address="auto")
 
 
+@needs_ray
+def test_node_that_dies__costs_its_tasks_no_try(monkeypatch: pytest.MonkeyPatch) -> None:
+    from ray.cluster_utils import Cluster
+
+    monkeypatch.setattr(parallel, "N_TRIES", 1)  # so that a loss which counted would fail a task
+    monkeypatch.setattr(parallel, "RAY_PATIENCE", 60.0)
+    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
+    node = cluster.add_node(num_cpus=1)  # a raylet of its own, in a process of its own
+    jobs: list[Job] = [("slow square", x) for x in range(24)]
+    try:
+        stream = map_tasks(do, jobs, engine="ray", address=cluster.address)
+        done = [next(stream)]
+        node.kill_raylet()
+        done.extend(stream)
+    finally:
+        cluster.shutdown()
+    assert {one.task: (one.value, one.error) for one in done} == {job: (job[1] ** 2, None) for job in jobs}
+
+
+def test_task_lost_far_too_often__is_given_up_and_says_to_what() -> None:
+    job: parallel._Job[str] = parallel._Job("much")
+    for _ in range(parallel.N_LOSSES - 1):
+        job, done = parallel._after_loss(job, "OutOfMemoryError")
+        assert done is None and 0.0 <= parallel._pause(job) <= parallel.MOST_PAUSE
+    _, done = parallel._after_loss(job, "OutOfMemoryError")
+    assert done is not None and done.error == "its worker was lost to the system 30 times (OutOfMemoryError)"
+
+
+MISMATCH = (
+    "RuntimeError: Version mismatch: The cluster was started with:\n    Ray: 2.50.0\n    Python: 3.11.7\n"
+    "This process on node 10.0.0.2 was started with:\n    Ray: 2.60.0\n    Python: 3.11.7\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("said", "expected"),
+    [
+        (
+            "gcs_client.cc:210: Failed to get cluster ID: RPC error: InvalidAuthToken: Authentication token is missing",
+            "the Ray cluster at 'head:6379' wants another token: start it, its nodes and this command with the same",
+        ),
+        (
+            MISMATCH,
+            "the Ray cluster at 'head:6379' runs Ray 2.50.0 and Python 3.11.7, this process Ray 2.60.0 and",
+        ),
+        (
+            "ConnectionError: refused",
+            "no Ray cluster answers at 'head:6379' (refused); start one with `ray start --head`",
+        ),
+    ],
+)
+def test_ray_address__says_which_of_token_version_and_silence_it_is(said: str, expected: str) -> None:
+    told = parallel._why_no_ray("head:6379", said, "refused")
+    assert told.startswith(expected) and "\n" not in told
+
+
 def test_ctrl_c__while_a_worker_starts_waits_until_it_has_started(monkeypatch: pytest.MonkeyPatch) -> None:
     process = multiprocessing.get_context("spawn").Process
     start, started = process.start, []
