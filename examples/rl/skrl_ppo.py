@@ -35,7 +35,7 @@ class Masked(CategoricalMixin, Model):
 
 envs = wrap_env(gymnasium.make_vec(NAME, num_envs=4, vectorization_mode="sync", wrappers=[wrap], **SETTINGS))
 spaces = {"observation_space": envs.observation_space, "action_space": envs.action_space, "device": "cpu"}
-layers = [{"name": "net", "input": "OBSERVATIONS", "layers": [128], "activations": "tanh"}]
+layers = [{"name": "net", "input": "OBSERVATIONS['observation']", "layers": [128], "activations": "tanh"}]
 models = {"policy": Masked(**spaces), "value": deterministic_model(network=layers, output="ONE", **spaces)}
 settings = PPO_CFG(rollouts=64, learning_epochs=4, mini_batches=2, learning_rate=3e-4, entropy_loss_scale=0.01)
 settings.experiment.write_interval = settings.experiment.checkpoint_interval = 0  # no files

@@ -8,7 +8,8 @@ import gymnasium
 import torch
 from tensordict import TensorDict
 from tensordict.nn import TensorDictModule
-from torchrl.envs import DTypeCastTransform, GymWrapper, TransformedEnv
+from torchrl.data import Unbounded
+from torchrl.envs import DTypeCastTransform, GymWrapper, TransformedEnv, default_info_dict_reader
 from torchrl.modules import MaskedCategorical, ProbabilisticActor, ValueOperator
 from torchrl.objectives import ClipPPOLoss
 
@@ -17,7 +18,9 @@ from examples.rl.nets import Net, as_batch
 
 envs = gymnasium.make_vec(NAME, num_envs=8, autoreset_mode="Disabled", **SETTINGS)  # TorchRL resets by itself
 space, keys = envs.single_observation_space, list(envs.single_observation_space)
-env = GymWrapper(envs, categorical_action_encoding=True).auto_register_info_dict()
+mask_spec = Unbounded((8, envs.single_action_space.n), dtype=torch.int8)
+reader = default_info_dict_reader(["action_mask"], [mask_spec])  # auto_register_info_dict() would try illegal actions
+env = GymWrapper(envs, categorical_action_encoding=True).set_info_dict_reader(reader)
 env = TransformedEnv(env, DTypeCastTransform(torch.int8, torch.bool, in_keys=["action_mask"]))
 logits = TensorDictModule(Net(space, envs.single_action_space.n), keys, ["logits"])
 mask = {"logits": "logits", "mask": "action_mask"}
