@@ -112,7 +112,7 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
     ...     action = env.action_space.sample(info["action_mask"])
     ...     observation, reward, terminated, truncated, info = env.step(action)
     ...     over = terminated or truncated
-    >>> info["best_r_all"] >= info["r_all"]
+    >>> bool(info["best_r_all"] >= info["r_all"])
     True
     """
 
