@@ -84,9 +84,7 @@ def test_data_set__of_other_operators_or_another_version_is_refused(folder: Path
     known = dataset.storage.metadata[VERSION]
     try:
         dataset.storage.update_metadata({VERSION: "0.0.1"})
-        with pytest.raises(
-            ConfigError, match=r"data set autopoly/small-v0 is of AutoPoly 0.0.1, this is .*; make it"
-        ):
+        with pytest.raises(ConfigError, match=r"data set autopoly/small-v0 is of AutoPoly 0.0.1, this is .*; make it"):
             load_plays(folder, NAME)
     finally:
         dataset.storage.update_metadata({VERSION: known})
