@@ -96,7 +96,20 @@ def test_command__refuses_in_one_line_what_cannot_be(folder: Path, capsys: pytes
     assert main([*common, f"--name={NAME}", "--n=1"]) == 2
     assert main([*common, "--name=autopoly/no-v0", "--n=0"]) == 2
     assert main([*common, "--name=autopoly/no-v0", "--n=1", "--env-option=resolution"]) == 2
+    assert main([*common, "--name=autopoly/no-v0", "--n=1", "--env-option=colour=red"]) == 2
+    assert main([*common, "--name=autopoly/no-v0", "--n=1", "--env=CartPole-v1"]) == 2
+    assert main([*common, "--name=no version", "--n=1"]) == 2
+    assert main([*common, "--name=autopoly/no-v0", "--n=1", "--agent=trace"]) == 2
     lines = capsys.readouterr().err.strip().splitlines()
-    assert len(lines) == 3
-    assert f"has a data set {NAME} already" in lines[0] and "expected at least 1 episode" in lines[1]
-    assert "expected key=value" in lines[2]
+    expected = (
+        f"has a data set {NAME} already",
+        "expected at least 1 episode",
+        "expected key=value",
+        "'colour'",
+        "env='CartPole-v1': expected one of 'AutoPoly-v0'",
+        "expected NAMESPACE/NAME-vN",
+        "trace finds outlines as a whole",
+    )
+    assert len(lines) == len(expected)
+    for line, text in zip(lines, expected, strict=True):
+        assert text in line

@@ -4,6 +4,7 @@ Minari alone reads them: `minari.load_dataset(NAME)` gives the episodes, `recove
 """
 
 import os
+import re
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -12,13 +13,16 @@ from typing import Any
 
 import gymnasium
 
-from agents.base import Agent
+from agents.base import Agent, WholeAgent
 from autopoly_env import __version__
+from autopoly_env.arguments import one_of
 from autopoly_env.env import AutoPolyEnv
 from autopoly_env.errors import ConfigError, OutputError
+from autopoly_env.shown import short
 from autopoly_env.wrappers import MaskInObservation
 
 VERSION, OPERATORS = "autopoly_version", "autopoly_operators"  # of the data set's metadata
+_NAME = re.compile(r"([\w-]+/)*[\w-]+-v\d+")  # what Minari takes
 FOLDER = "MINARI_DATASETS_PATH"  # the variable that tells Minari where its data sets are
 
 
@@ -44,9 +48,15 @@ def record_plays(
     minari = _minari(folder)
     if settings.n < 1:
         raise ConfigError(f"n={settings.n}: expected at least 1 episode")
+    if not _NAME.fullmatch(settings.name):
+        raise ConfigError(f"data set {short(settings.name)}: expected NAMESPACE/NAME-vN, such as autopoly/greedy-v0")
+    if isinstance(agent, WholeAgent):
+        raise ConfigError(
+            f"{agent.name} finds outlines as a whole, of which there is no play: choose mcts, greedy or ppo"
+        )
     if settings.name in minari.list_local_datasets():
         raise ConfigError(f"{folder} has a data set {settings.name} already; give another name or another folder")
-    env = MaskInObservation(gymnasium.make(f"autopoly_env:{settings.env}", **dict(settings.settings)))
+    env = MaskInObservation(_made(settings))
     agent.check(_simulator_of(env, settings.seed))
     try:
         recorder = minari.DataCollector(env, record_infos=True, jpeg_encoding=False)  # JPEG is not what was seen
@@ -84,6 +94,16 @@ def load_plays(folder: Path, name: str, env: gymnasium.Env[Any, Any] | None = No
             "give both the same"
         )
     return dataset
+
+
+def _made(settings: PlaySettings) -> gymnasium.Env[Any, Any]:
+    """The environment of the settings. Raises ConfigError for one that is unknown, or has no such arguments."""
+    known = tuple(name for name in gymnasium.registry if name.startswith("AutoPoly"))
+    name = one_of("env", settings.env, known)
+    try:
+        return gymnasium.make(f"autopoly_env:{name}", **dict(settings.settings))
+    except TypeError as error:  # Gymnasium's, around Python's
+        raise ConfigError(f"{name}: {short(str(error), 160)}") from None
 
 
 def _played(env: Any, agent: Agent) -> Iterator[int]:
