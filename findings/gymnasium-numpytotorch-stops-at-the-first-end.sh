@@ -11,7 +11,7 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 cd "$folder"
 python3 -m venv venv
-venv/bin/pip install --quiet --disable-pip-version-check gymnasium==1.4.0 array-api-compat==1.16.0 torch==2.13.0 numpy==2.4.6
+venv/bin/pip install --quiet --disable-pip-version-check 'gymnasium[array-api]==1.4.0' torch==2.13.0 numpy==2.4.6
 venv/bin/python - <<'PYTHON'
 import sys
 
