@@ -63,10 +63,10 @@ def test_planner__uses_the_simulator_and_leaves_the_env_alone() -> None:
 def test_same_seed__gives_the_same_episode_in_another_process() -> None:
     code = (
         "import gymnasium\n"
-        "env = gymnasium.make('autopoly_env:AutoPoly-v0', resolution=16, obs_resolution=16)\n"
+        "env = gymnasium.make('autopoly_env:AutoPoly-v0', resolution=16, obs_resolution=16, info_texts=True)\n"
         "print(env.reset(seed=4)[1]['target'], env.step(3)[1].hex(), env.reset()[1]['target'])"
     )
-    env = gymnasium.make("autopoly_env:AutoPoly-v0", **SMALL)
+    env = gymnasium.make("autopoly_env:AutoPoly-v0", **SMALL, info_texts=True)
     expected = [env.reset(seed=4)[1]["target"], env.step(3)[1].hex(), env.reset()[1]["target"]]
     told = subprocess.run([sys.executable, "-c", code], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True).stdout
     assert told.split() == expected
