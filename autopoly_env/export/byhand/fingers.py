@@ -55,7 +55,7 @@ class Fingers:
 
     def drag(self, act: dict) -> Iterator[None]:
         yield from self.key(act["keys"][-1], shift="Shift" in act["keys"])
-        x, y = (f"{value:.3f}" for value in act["by"])
+        x, y = (f"{value:.4f}" for value in act["by"])
         self.write(x)
         self.tap("Tab")
         self.write(y)
@@ -75,7 +75,7 @@ class Fingers:
         yield from self.hover(middle)
         yield from self.point(middle)
         if act["factor"]:
-            self.write(f"{act['factor']:.3f}")
+            self.write(f"{act['factor']:.4f}")
             yield
             places = [p for ends in self.state()["selected"] for p in ends]
             if min(abs(x - act["to"][0]) + abs(y - act["to"][1]) for x, y in places) > 0.004:

@@ -17,9 +17,9 @@ from autopoly_env.export.byhand import saying
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators.deeds import Cut, Deed, Ids, Loop, Press, Pull, Selection
 
-DIGITS = 3  # of a distance that is typed, in units of the unit square
+DIGITS = 4  # of a distance that is typed, in units of the unit square
 SEEN = 0.005  # units; who drags by eye need not care for less
-CLOSE = 0.0007  # of a coordinate; a vertex that is so near to its place stays
+CLOSE = 0.0002  # of a coordinate; a vertex that is so near to its place stays
 MODE_KEYS = {"vertex": "1", "edge": "2", "face": "3"}
 
 Place = tuple[float, float]

@@ -12,7 +12,7 @@ Place = tuple[float, float]
 
 def number(value: float) -> str:
     """`0.25`, `-0.125`, `0`."""
-    text = f"{value:.3f}".rstrip("0").rstrip(".")
+    text = f"{value:.4f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text
 
 
