@@ -10,7 +10,7 @@
 set -euo pipefail
 
 folder=$(mktemp -d)
-trap 'kill $(pgrep -f "$folder") 2>/dev/null || true; rm -rf "$folder"' EXIT
+trap 'kill -9 $(pgrep -f "$folder") 2>/dev/null || true; rm -rf "$folder"' EXIT
 cd "$folder"
 python3 -m venv venv
 venv/bin/pip install --quiet --disable-pip-version-check ray==2.60.0
