@@ -1,4 +1,4 @@
-"""Commands that are run in the tests' own process."""
+"""Commands that are run in the tests' own process, and what those in another one say."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,6 +16,11 @@ class Said:
 
 
 Run = Callable[..., Said]
+
+
+def without_pulses(stderr: str) -> list[str]:
+    """The lines of a process, but for its signs of life: how many there are depends on the machine."""
+    return [line for line in stderr.splitlines() if not line.startswith("  ... ")]
 
 
 def runner(main: Callable[[list[str]], int], capsys: pytest.CaptureFixture[str]) -> Run:
