@@ -27,7 +27,8 @@ QUIET, LOUD = 0, 1  # announcements
 def run_python(code: str, package_parent: Path, **variables: str) -> tuple[str, int]:
     """(What a process that imports the package from there prints, how often it says that it compiles)."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("NUMBA", "AUTOPOLY"))}
-    environment |= {"PYTHONPATH": str(package_parent), **variables}
+    # No .pyc files: Python tells them from their sources by size and whole seconds, and a test changes a file in less.
+    environment |= {"PYTHONPATH": str(package_parent), "PYTHONDONTWRITEBYTECODE": "1", **variables}
     done = subprocess.run(
         [sys.executable, "-c", code], env=environment, cwd=package_parent, capture_output=True, text=True, timeout=120
     )
