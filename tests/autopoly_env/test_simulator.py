@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from autopoly_env import placement
@@ -439,13 +439,14 @@ def test_random_play__never_does_worse_than_the_operators(target: int, seed: int
 
 
 @given(st.integers(0, 99), st.integers(0, 2**32 - 1))
+@example(45, 174)  # loses three hairlines, and a point of r_all with them
 @settings(max_examples=15)
-def test_polish__never_lowers_the_score(target: int, seed: int) -> None:
+def test_polish__never_lowers_what_a_mesh_is_worth(target: int, seed: int) -> None:
     game = Simulator(noise(target, 48), resolution=32)
     for _, after in played(game, seed, 4):
         polished = game.polish(after.mesh)
         assert polished.topology is after.mesh.topology
-        assert game.final_score(polished).total >= game.final_score(after.mesh).total
+        assert game.worth(polished) >= game.worth(after.mesh)
 
 
 # --- what a refit aims at ---
