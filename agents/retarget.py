@@ -10,7 +10,8 @@ import typer
 
 from agents.commands import pictures
 from agents.commands.operators import FaceRuleOfSequence, OutsideOperators, know
-from agents.commands.running import INTERRUPTED, run_command
+from agents.commands.running import run_command
+from agents.commands.starting import INTERRUPTED
 from autopoly_env.errors import ConfigError, SequenceError
 
 if TYPE_CHECKING:
@@ -72,8 +73,8 @@ def retarget(
     from agents.commands.report import Report
     from agents.commands.results import Result, claim_folder, write_results
     from agents.commands.solving import name_jobs
-    from agents.retell.frame import axis_of
     from agents.retell.retargeting import retarget as work
+    from autopoly_env.mesh.symmetry import axis_of
     from autopoly_env.sequence import ConstructionSequence
     from autopoly_env.silhouette import load_silhouette
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from agents.commands.operators import FaceRuleOfSequence, OutsideOperators, know
-from agents.commands.running import INTERRUPTED, run_command
+from agents.commands.running import run_command
+from agents.commands.starting import INTERRUPTED
 from autopoly_env.errors import ConfigError, SequenceError
 
 if TYPE_CHECKING:

@@ -7,11 +7,11 @@ import sys
 
 import typer
 
-from agents.commands.starting import listen, note_interrupt
+from agents.commands.starting import INTERRUPTED, listen, note_interrupt
 from autopoly_env.errors import AutoPolyError, ConfigError
 from autopoly_env.shown import told
 
-FAILURE, USAGE_ERROR, INTERRUPTED = 1, 2, 130
+FAILURE, USAGE_ERROR = 1, 2
 TOLD = -INTERRUPTED  # what a command returns that has told of its Ctrl-C itself
 STOPPED = "stopped by Ctrl-C"
 GOES_ON = "stopped by Ctrl-C; the same command goes on from here"

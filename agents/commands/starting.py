@@ -14,7 +14,7 @@ from types import FrameType
 from typing import NoReturn
 
 _LINE = b"error: stopped by Ctrl-C\n"
-_INTERRUPTED = 130
+INTERRUPTED = 130
 BEGAN = time.monotonic()  # when the command did, nearly
 _is_command = _is_interrupted = False
 
@@ -52,9 +52,9 @@ def _leave_interrupted() -> None:
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, ValueError, AttributeError):
             stream.flush()
-    os._exit(_INTERRUPTED)
+    os._exit(INTERRUPTED)
 
 
 def _leave(_number: int, _frame: FrameType | None) -> NoReturn:
     os.write(2, _LINE)
-    os._exit(_INTERRUPTED)
+    os._exit(INTERRUPTED)

@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from autopoly_env.arrays import FloatArray, IntArray
-from autopoly_env.mesh import PolyMesh, images_of, mirrored
+from autopoly_env.mesh import PolyMesh, mirrored
 from autopoly_env.sequence.follower import PointMap
 
 EXACT = 1e-6  # unit square: edges that are off by less are level or plumb, and points are one
@@ -75,12 +75,6 @@ class Frame:
             return bent
 
         return place
-
-
-def axis_of(mesh: PolyMesh) -> float | None:
-    """x of the axis about which the outline is its own mirror image; None where it is not."""
-    axis = 0.5 * float(mesh.vertices[:, 0].min() + mesh.vertices[:, 0].max())
-    return None if images_of(mesh, axis) is None else axis
 
 
 def _groups(n: int, ties: Sequence[IntArray]) -> IntArray:

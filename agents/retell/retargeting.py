@@ -15,7 +15,7 @@ from agents.budget import Budget, Meter, Progress
 from agents.finish import finish
 from agents.finish.align import Regularity
 from agents.finish.align import aligned as regular
-from agents.retell.frame import EXACT, Frame, axis_of
+from agents.retell.frame import EXACT, Frame
 from agents.retell.versions import Version, first_settled, neighbours, total_of, version_of
 from agents.solution import Solution
 from agents.trace.rings import signed_area, trace_rings
@@ -23,6 +23,7 @@ from autopoly_env.arrays import FloatArray
 from autopoly_env.compute import map_threads
 from autopoly_env.errors import AutoPolyError, SequenceError
 from autopoly_env.mesh import PolyMesh, images_of, mirrored
+from autopoly_env.mesh.symmetry import axis_of
 from autopoly_env.raster import coverage
 from autopoly_env.refit import FROM_AFAR, LOCAL, THOROUGH, RefitConfig, mended, refit
 from autopoly_env.score import Score

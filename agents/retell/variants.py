@@ -6,10 +6,11 @@ from functools import partial
 
 import numpy as np
 
-from agents.retell.frame import Frame, axis_of
+from agents.retell.frame import Frame
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import AutoPolyError, SequenceError
 from autopoly_env.mesh import PolyMesh, is_sane
+from autopoly_env.mesh.symmetry import axis_of
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence.deformation import ThinPlate
 from autopoly_env.sequence.follower import PointMap

@@ -7,7 +7,7 @@ import shapely
 
 from autopoly_env.errors import ConfigError, OutputError
 from autopoly_env.mesh import Face, PolyMesh
-from autopoly_env.mesh.symmetry import TOLERANCE, images_of
+from autopoly_env.mesh.symmetry import TOLERANCE, axis_of, middle_of
 
 Place = tuple[float, float]
 
@@ -15,14 +15,14 @@ Place = tuple[float, float]
 def halved(mesh: PolyMesh) -> tuple[PolyMesh, float]:
     """The part to the right of the axis, and the axis' x. Faces across it are cut, so inside they need not be alike.
 
-    What lies within `TOLERANCE` of the axis is put on it. Raises OutputError as `axis_of` does, or where nothing is
+    What lies within `TOLERANCE` of the axis is put on it. Raises OutputError as `half_axis` does, or where nothing is
     left.
 
     >>> half, axis = halved(PolyMesh.rectangle(0.0, 0.0, 1.0, 0.5))
     >>> axis, half.vertices.tolist()
     (0.5, [[1.0, 0.0], [1.0, 0.5], [0.5, 0.0], [0.5, 0.5]])
     """
-    axis = axis_of(mesh)
+    axis = half_axis(mesh)
     places = mesh.vertices.copy()
     places[np.abs(places[:, 0] - axis) <= TOLERANCE, 0] = axis
     points: list[Place] = [(x, y) for x, y in places.tolist()]
@@ -35,16 +35,13 @@ def halved(mesh: PolyMesh) -> tuple[PolyMesh, float]:
     return PolyMesh.from_faces([points[v] for v in kept], [tuple(number[v] for v in part) for part in parts]), axis
 
 
-def axis_of(mesh: PolyMesh) -> float:
-    """x of the upright line about which the outline is its own mirror image: the middle of its box.
-
-    Raises OutputError where it is not, vertex for vertex.
-    """
-    axis = 0.5 * float(mesh.vertices[:, 0].min() + mesh.vertices[:, 0].max())
-    if images_of(mesh, axis) is None:
+def half_axis(mesh: PolyMesh) -> float:
+    """`axis_of`. Raises OutputError where there is none."""
+    axis = axis_of(mesh)
+    if axis is None:
         raise OutputError(
-            f"the outline is not its own mirror image about x = {axis:g}, the middle: there is no half of it; "
-            "build it by agents.solve --symmetry best"
+            f"the outline is not its own mirror image about x = {middle_of(mesh):g}, the middle: there is no half of "
+            "it; build it by agents.solve --symmetry best"
         )
     return axis
 

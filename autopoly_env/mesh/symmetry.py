@@ -44,6 +44,17 @@ def images_of(mesh: PolyMesh, axis: float) -> IntArray | None:
     return images
 
 
+def middle_of(mesh: PolyMesh) -> float:
+    """x of the middle of the box around the mesh: the only axis that it can be symmetric about."""
+    return 0.5 * float(mesh.vertices[:, 0].min() + mesh.vertices[:, 0].max())
+
+
+def axis_of(mesh: PolyMesh) -> float | None:
+    """x of the axis about which the outline is its own mirror image; None where it is not."""
+    axis = middle_of(mesh)
+    return None if images_of(mesh, axis) is None else axis
+
+
 def _image_of_loop(
     vertices: FloatArray, loop: IntArray, loops: list[IntArray], axis: float
 ) -> tuple[IntArray, IntArray] | None:

@@ -14,9 +14,9 @@ from PIL import Image
 
 from agents.budget import Budget, Meter, Progress
 from agents.retarget import _words, main
-from agents.retell.frame import axis_of
 from agents.retell.retargeting import align, retarget
 from autopoly_env.mesh import PolyMesh, is_sane
+from autopoly_env.mesh.symmetry import axis_of
 from autopoly_env.operators import OPERATORS, Action
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import Silhouette

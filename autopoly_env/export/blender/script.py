@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from autopoly_env.errors import ConfigError, SequenceError
-from autopoly_env.export.half import axis_of, check_flat
+from autopoly_env.export.half import check_flat, half_axis
 from autopoly_env.export.pictures import picture_url
 from autopoly_env.export.replay import finite_meshes, sequence_name, unmoved
 from autopoly_env.export.solid import check_depth
@@ -70,7 +70,7 @@ def blender_script(
         f"NAME = {sequence_name(sequence)!a}",
         f"DEPTH = {float(depth)!r}  # thickness, in units of the unit square; 0 is flat",
         f"KEYFRAMES = {bool(keyframes)}  # an object for every step, shown one after the other",
-        f"HALF = {axis_of(meshes[-1]) if half else None}  # x at which it is cut, for a Mirror modifier; None: whole",
+        f"HALF = {half_axis(meshes[-1]) if half else None}  # x at which it is cut, for a Mirror modifier; None: whole",
         f"PICTURE = {_picture(target)!r}  # what is built, a PNG in base64, laid under the mesh",
     ]
     own = _own_code(sequence)

@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 import typer
 
-from agents.commands.running import FAILURE, INTERRUPTED, TOLD, USAGE_ERROR, run_command
+from agents.commands.running import FAILURE, TOLD, USAGE_ERROR, run_command
+from agents.commands.starting import INTERRUPTED
 from autopoly_env.errors import AutoPolyError, ConfigError
 from tests.helpers.paths import ROOT
 
