@@ -52,13 +52,34 @@ def _segments_meet(p: FloatArray, a: int, b: int, c: int, d: int) -> int:
     return 1  # collinear segments come here too, and their boxes overlap, so they touch
 
 
+_NO_RIM = np.empty(0, np.bool_)
+
+
 @kernel
 def count_crossings(points: FloatArray, edges: IntArray) -> tuple[int, int]:
     """Pairs of edges that share no vertex and meet: (certain ones, ones that rounding decides)."""
-    certain, uncertain = 0, 0
+    certain, uncertain, _ = _count_pairs(points, edges, _NO_RIM, 0.0)
+    return certain, uncertain
+
+
+@kernel
+def _count_pairs(points: FloatArray, edges: IntArray, on_rim: BoolArray, gap: float) -> tuple[int, int, int]:
+    """`count_crossings`, and pairs of boundary edges (`on_rim` (E,)) that share no vertex, do not meet, and come closer
+    than `gap`.
+
+    Nearly all pairs lie apart, and their boxes, side by side in memory, tell so.
+    """
+    certain, uncertain, near = 0, 0, 0
+    boxes = np.empty((edges.shape[0], 4))  # low x, high x, low y, high y
     for i in range(edges.shape[0]):
         a, b = edges[i, 0], edges[i, 1]
+        ax, ay, bx, by = points[a, 0], points[a, 1], points[b, 0], points[b, 1]
+        low_x, high_x, low_y, high_y = min(ax, bx), max(ax, bx), min(ay, by), max(ay, by)
+        boxes[i, 0], boxes[i, 1], boxes[i, 2], boxes[i, 3] = low_x, high_x, low_y, high_y
+        low_x, high_x, low_y, high_y = low_x - gap, high_x + gap, low_y - gap, high_y + gap
         for j in range(i):
+            if boxes[j, 1] < low_x or boxes[j, 0] > high_x or boxes[j, 3] < low_y or boxes[j, 2] > high_y:
+                continue
             c, d = edges[j, 0], edges[j, 1]
             if a == c or a == d or b == c or b == d:
                 continue
@@ -67,7 +88,10 @@ def count_crossings(points: FloatArray, edges: IntArray) -> tuple[int, int]:
                 certain += 1
             elif meet == UNCERTAIN:
                 uncertain += 1
-    return certain, uncertain
+            elif on_rim.shape[0] > 0 and on_rim[i] and on_rim[j]:
+                cx, cy, dx, dy = points[c, 0], points[c, 1], points[d, 0], points[d, 1]
+                near += segments_near(ax, ay, bx, by, cx, cy, dx, dy, gap)
+    return certain, uncertain, near
 
 
 @kernel
@@ -87,36 +111,13 @@ def face_areas(points: FloatArray, corners: IntArray, offsets: IntArray) -> Floa
 
 
 @kernel
-def count_hairlines(points: FloatArray, edges: IntArray, on_rim: BoolArray, gap: float) -> int:
-    """Pairs of boundary edges (`on_rim` (E,)) that share no vertex, do not meet, and come closer than `gap`."""
-    n_pairs = 0
-    for i in range(edges.shape[0]):
-        if not on_rim[i]:
-            continue
-        a, b = edges[i, 0], edges[i, 1]
-        low_x, high_x = min(points[a, 0], points[b, 0]) - gap, max(points[a, 0], points[b, 0]) + gap
-        low_y, high_y = min(points[a, 1], points[b, 1]) - gap, max(points[a, 1], points[b, 1]) + gap
-        for j in range(i):
-            c, d = edges[j, 0], edges[j, 1]
-            if not on_rim[j] or a == c or a == d or b == c or b == d:
-                continue
-            cx, cy, dx, dy = points[c, 0], points[c, 1], points[d, 0], points[d, 1]
-            if max(cx, dx) < low_x or min(cx, dx) > high_x or max(cy, dy) < low_y or min(cy, dy) > high_y:
-                continue
-            near = segments_near(points[a, 0], points[a, 1], points[b, 0], points[b, 1], cx, cy, dx, dy, gap)
-            if near and _segments_meet(points, a, b, c, d) == 0:
-                n_pairs += 1
-    return n_pairs
-
-
-@kernel
 def defects(
     points: FloatArray, edges: IntArray, on_rim: BoolArray, corners: IntArray, offsets: IntArray
 ) -> tuple[int, int, int]:
     """(crossings, hairlines, flipped or empty faces) of a mesh; a crossing that rounding decides counts."""
-    certain, uncertain = count_crossings(points, edges)
+    certain, uncertain, hairlines = _count_pairs(points, edges, on_rim, CLEARANCE)
     flipped = 0
     for area in face_areas(points, corners, offsets):
         if not area > _MIN_FACE_AREA:
             flipped += 1
-    return certain + uncertain, count_hairlines(points, edges, on_rim, CLEARANCE), flipped
+    return certain + uncertain, hairlines, flipped

@@ -3,6 +3,10 @@
 Only touched cells depend on the vertices; the rest of a row is constant spans, whose squared error prefix sums of the
 target give. Letters and units as in `raster_kernels`.
 
+Along one edge all pieces have the same normal. So what they add to a gradient or to J'J is summed up as numbers first,
+edge by edge (`Workspace.sums`), and turned into vectors and blocks once per edge. That holds for J'J where a cell has a
+single piece, as most have; the others add their outer products pixel by pixel.
+
 Pixels may have weights, which the prefix sums of a `Picture` then count. Without (`NO_WEIGHTS`) every pixel weighs 1.
 """
 
@@ -26,6 +30,8 @@ from autopoly_env.raster.raster_kernels import (
     span_weight,
     walk_boundary,
 )
+
+AT_START, AT_END, START_START, START_END, END_END = 0, 1, 2, 3, 4  # of `Workspace.sums`
 
 
 @kernel
@@ -54,10 +60,11 @@ def half_gradient(
                 total += work.cells[cell, COVER]
                 pull = _weighed(residual, row, here, picture.weight_sum)
                 loss += residual * pull
-                _pull(points, edges, size, cell, pull, work, gradient)
+                _pull(cell, pull, work)
                 clear(cell, work)
                 column = here + 1
         loss += _span_loss(total, row, column, size, picture)
+    _empty_sums(points, edges, size, work, gradient)
     return loss if not loss < 0.0 else 0.0  # differences of prefix sums may round to less than nothing
 
 
@@ -80,21 +87,29 @@ def _span_loss(total: float, row: int, first: int, last: int, picture: Picture) 
 
 
 @kernel
-def _pull(
-    points: FloatArray, edges: IntArray, size: int, cell: int, residual: float, work: Workspace, gradient: FloatArray
-) -> None:  # fmt: skip
-    """Add residual * d coverage / d position (per pixel) of one cell to `gradient` (V, 2)."""
+def _pull(cell: int, residual: float, work: Workspace) -> None:
+    """Add residual * integrals of (1 - t) and t of one cell's pieces to the sums of their edges."""
     piece = int(work.cells[cell, HEAD]) - 1
     while piece >= 0:
         edge = int(work.pieces[piece, EDGE])
-        i, j = edges[edge, 0], edges[edge, 1]
-        along_x = residual * (points[j, 1] - points[i, 1]) * size
-        along_y = residual * (points[i, 0] - points[j, 0]) * size
-        gradient[i, 0] += work.pieces[piece, START] * along_x
-        gradient[i, 1] += work.pieces[piece, START] * along_y
-        gradient[j, 0] += work.pieces[piece, END] * along_x
-        gradient[j, 1] += work.pieces[piece, END] * along_y
+        work.sums[edge, AT_START] += residual * work.pieces[piece, START]
+        work.sums[edge, AT_END] += residual * work.pieces[piece, END]
         piece = int(work.pieces[piece, NEXT]) - 1
+
+
+@kernel
+def _empty_sums(points: FloatArray, edges: IntArray, size: int, work: Workspace, gradient: FloatArray) -> None:
+    """Add what `_pull` summed up to `gradient` (V, 2), per pixel, and leave the sums at zero."""
+    for edge in range(edges.shape[0]):
+        i, j = edges[edge, 0], edges[edge, 1]
+        normal_x = (points[j, 1] - points[i, 1]) * size
+        normal_y = (points[i, 0] - points[j, 0]) * size
+        at_start, at_end = work.sums[edge, AT_START], work.sums[edge, AT_END]
+        gradient[i, 0] += at_start * normal_x
+        gradient[i, 1] += at_start * normal_y
+        gradient[j, 0] += at_end * normal_x
+        gradient[j, 1] += at_end * normal_y
+        work.sums[edge, AT_START] = work.sums[edge, AT_END] = 0.0
 
 
 @kernel
@@ -137,14 +152,52 @@ def normal_equations(
                     loss += _span_loss(total, row, column, here, picture)
                 residual = total + work.cells[cell, AREA] - picture.coverage[row, here]
                 total += work.cells[cell, COVER]
-                m = _cell_jacobian(points, edges, size, cell, work, vertices, rows)
-                residual = _scaled_row(m, residual, row, here, rows, picture.weight_sum)
-                loss += residual * residual
-                _add_outer_product(m, residual, vertices, rows, gradient, normal)
+                pull = _weighed(residual, row, here, picture.weight_sum)
+                loss += residual * pull
+                piece = int(work.cells[cell, HEAD]) - 1
+                if piece >= 0 and work.pieces[piece, NEXT] == 0.0:
+                    weight = _weighed(1.0, row, here, picture.weight_sum)
+                    _pull(cell, pull, work)
+                    _sum_squares(piece, weight, work)
+                else:
+                    m = _cell_jacobian(points, edges, size, cell, work, vertices, rows)
+                    residual = _scaled_row(m, residual, row, here, rows, picture.weight_sum)
+                    _add_outer_product(m, residual, vertices, rows, gradient, normal)
                 clear(cell, work)
                 column = here + 1
         loss += _span_loss(total, row, column, size, picture)
+    _empty_squares(points, edges, size, work, normal)
+    _empty_sums(points, edges, size, work, gradient)
     return loss if not loss < 0.0 else 0.0
+
+
+@kernel
+def _sum_squares(piece: int, weight: float, work: Workspace) -> None:
+    """Add the products of one piece's two integrals to the sums of its edge."""
+    edge = int(work.pieces[piece, EDGE])
+    start, end = work.pieces[piece, START], work.pieces[piece, END]
+    work.sums[edge, START_START] += weight * start * start
+    work.sums[edge, START_END] += weight * start * end
+    work.sums[edge, END_END] += weight * end * end
+
+
+@kernel
+def _empty_squares(points: FloatArray, edges: IntArray, size: int, work: Workspace, normal: FloatArray) -> None:
+    """Add what `_sum_squares` summed up to the lower triangle of J'WJ (2V, 2V), and leave the sums at zero."""
+    for edge in range(edges.shape[0]):
+        i, j = edges[edge, 0], edges[edge, 1]
+        x = (points[j, 1] - points[i, 1]) * size
+        y = (points[i, 0] - points[j, 0]) * size
+        for vertex, kind in ((i, START_START), (j, END_END)):
+            normal[2 * vertex, 2 * vertex] += work.sums[edge, kind] * x * x
+            normal[2 * vertex + 1, 2 * vertex] += work.sums[edge, kind] * x * y
+            normal[2 * vertex + 1, 2 * vertex + 1] += work.sums[edge, kind] * y * y
+        u, v, both = 2 * max(i, j), 2 * min(i, j), work.sums[edge, START_END]
+        normal[u, v] += both * x * x
+        normal[u, v + 1] += both * x * y
+        normal[u + 1, v] += both * x * y
+        normal[u + 1, v + 1] += both * y * y
+        work.sums[edge, START_START] = work.sums[edge, START_END] = work.sums[edge, END_END] = 0.0
 
 
 @kernel
@@ -232,8 +285,9 @@ def vector_jacobian(
                 column = word * 64 + int(trailing_zeros(bits))
                 bits &= bits - np.uint64(1)
                 cell = row * (size + PADDING) + column
-                _pull(points, edges, size, cell, cotangent[row, column] * size, work, gradient)
+                _pull(cell, cotangent[row, column] * size, work)
                 clear(cell, work)
+    _empty_sums(points, edges, size, work, gradient)
 
 
 @kernel

@@ -31,6 +31,7 @@ class Workspace(NamedTuple):
     cells: FloatArray  # (R*(R+PADDING), 4) signed AREA inside the cell (later the residual), COVER passed on, 1 + HEAD
     touched: UIntArray  # (R*words,) bit set, 64 columns a word
     pieces: FloatArray  # (P, 4) EDGE, integrals START of (1 - t) and END of t, NEXT piece of the same cell
+    sums: FloatArray  # (B, 5) over the pieces of each edge, of what derivatives add up: see `derivative_kernels`
 
 
 NO_WEIGHTS = np.empty((0, 0))  # where every pixel weighs 1

@@ -29,12 +29,15 @@ def workspace(resolution: int, n_edges: int) -> Workspace:
     """Scratch arrays of this thread, large enough for B = `n_edges` boundary edges on an R = `resolution` grid."""
     cells, pieces = resolution * (resolution + raster_kernels.PADDING), n_edges * (2 * resolution + 4)
     held: Workspace | None = getattr(_local, "workspace", None)
-    if held is not None and len(held.cells) >= cells and len(held.pieces) >= pieces:
+    if held is not None and len(held.cells) >= cells and len(held.pieces) >= pieces and len(held.sums) >= n_edges:
         return held
     if held is not None:
         cells, pieces = max(cells, len(held.cells)), max(pieces, len(held.pieces))
     words = cells // 64 + int(np.sqrt(cells)) + 1  # a last word for each row
-    _local.workspace = Workspace(np.zeros((cells, 4)), np.zeros(words, np.uint64), np.zeros((pieces, 4)))
+    sums = max(n_edges, 0 if held is None else len(held.sums))
+    _local.workspace = Workspace(
+        np.zeros((cells, 4)), np.zeros(words, np.uint64), np.zeros((pieces, 4)), np.zeros((sums, 5))
+    )
     return _local.workspace
 
 
