@@ -4,8 +4,7 @@ Only touched cells depend on the vertices; the rest of a row is constant spans, 
 target give. Letters and units as in `raster_kernels`.
 
 Along one edge all pieces have the same normal. So what they add to a gradient or to J'J is summed up as numbers first,
-edge by edge (`Workspace.sums`), and turned into vectors and blocks once per edge. That holds for J'J where a cell has a
-single piece, as most have; the others add their outer products pixel by pixel.
+edge by edge (`Workspace.sums`), and turned into vectors and blocks once per edge.
 
 Pixels may have weights, which the prefix sums of a `Picture` then count. Without (`NO_WEIGHTS`) every pixel weighs 1.
 """
@@ -39,10 +38,18 @@ def half_gradient(
     points: FloatArray, edges: IntArray, picture: Picture, work: Workspace, gradient: FloatArray
 ) -> float:  # fmt: skip
     """Return the sum over pixels of (coverage - target)**2; half its gradient per pixel goes into `gradient` (V, 2)."""
+    loss = _sum_residuals(points, edges, picture, work, False)
+    gradient[:] = 0.0
+    _empty_sums(points, edges, picture.coverage.shape[0], work, gradient)
+    return loss
+
+
+@kernel
+def _sum_residuals(points: FloatArray, edges: IntArray, picture: Picture, work: Workspace, squares: bool) -> float:
+    """Return the loss; leave what derivatives need in `work.sums`, with `squares` what J'J needs, too."""
     size = picture.coverage.shape[0]
     walk_boundary(points, edges, size, work, 0, size)
     words = (size + 63) >> 6
-    gradient[:] = 0.0
     loss = 0.0
     for row in range(size):
         total = 0.0
@@ -61,10 +68,11 @@ def half_gradient(
                 pull = _weighed(residual, row, here, picture.weight_sum)
                 loss += residual * pull
                 _pull(cell, pull, work)
+                if squares:
+                    _sum_squares(cell, _weighed(1.0, row, here, picture.weight_sum), work)
                 clear(cell, work)
                 column = here + 1
         loss += _span_loss(total, row, column, size, picture)
-    _empty_sums(points, edges, size, work, gradient)
     return loss if not loss < 0.0 else 0.0  # differences of prefix sums may round to less than nothing
 
 
@@ -129,56 +137,30 @@ def loss_and_gradient(
 def normal_equations(
     points: FloatArray, edges: IntArray, picture: Picture, work: Workspace, gradient: FloatArray, normal: FloatArray
 ) -> float:
-    """As `half_gradient`, and write the lower triangle of J'WJ (2V, 2V): unknown 2v is x of vertex v, 2v+1 its y."""
-    size = picture.coverage.shape[0]
-    walk_boundary(points, edges, size, work, 0, size)
-    words = (size + 63) >> 6
-    vertices = np.empty(points.shape[0], np.int64)
-    rows = np.empty((points.shape[0], 2))
+    """As `half_gradient`, and write the lower triangle of the sum over edges of J'WJ (2V, 2V), J by one edge alone.
+
+    Unknown 2v is x of vertex v, 2v+1 its y. In pixels that several edges cross this is not all of J'WJ, but it joins
+    neighbours only, so that it is solved in no time however many vertices there are.
+    """
+    loss = _sum_residuals(points, edges, picture, work, True)
     gradient[:] = 0.0
     normal[:] = 0.0
-    loss = 0.0
-    for row in range(size):
-        total = 0.0
-        column = 0
-        for word in range(words):
-            bits = work.touched[row * words + word]
-            work.touched[row * words + word] = 0
-            while bits != 0:
-                here = word * 64 + int(trailing_zeros(bits))
-                bits &= bits - np.uint64(1)
-                cell = row * (size + PADDING) + here
-                if here > column:
-                    loss += _span_loss(total, row, column, here, picture)
-                residual = total + work.cells[cell, AREA] - picture.coverage[row, here]
-                total += work.cells[cell, COVER]
-                pull = _weighed(residual, row, here, picture.weight_sum)
-                loss += residual * pull
-                piece = int(work.cells[cell, HEAD]) - 1
-                if piece >= 0 and work.pieces[piece, NEXT] == 0.0:
-                    weight = _weighed(1.0, row, here, picture.weight_sum)
-                    _pull(cell, pull, work)
-                    _sum_squares(piece, weight, work)
-                else:
-                    m = _cell_jacobian(points, edges, size, cell, work, vertices, rows)
-                    residual = _scaled_row(m, residual, row, here, rows, picture.weight_sum)
-                    _add_outer_product(m, residual, vertices, rows, gradient, normal)
-                clear(cell, work)
-                column = here + 1
-        loss += _span_loss(total, row, column, size, picture)
-    _empty_squares(points, edges, size, work, normal)
-    _empty_sums(points, edges, size, work, gradient)
-    return loss if not loss < 0.0 else 0.0
+    _empty_squares(points, edges, picture.coverage.shape[0], work, normal)
+    _empty_sums(points, edges, picture.coverage.shape[0], work, gradient)
+    return loss
 
 
 @kernel
-def _sum_squares(piece: int, weight: float, work: Workspace) -> None:
-    """Add the products of one piece's two integrals to the sums of its edge."""
-    edge = int(work.pieces[piece, EDGE])
-    start, end = work.pieces[piece, START], work.pieces[piece, END]
-    work.sums[edge, START_START] += weight * start * start
-    work.sums[edge, START_END] += weight * start * end
-    work.sums[edge, END_END] += weight * end * end
+def _sum_squares(cell: int, weight: float, work: Workspace) -> None:
+    """Add the products of each piece's two integrals to the sums of its edge."""
+    piece = int(work.cells[cell, HEAD]) - 1
+    while piece >= 0:
+        edge = int(work.pieces[piece, EDGE])
+        start, end = work.pieces[piece, START], work.pieces[piece, END]
+        work.sums[edge, START_START] += weight * start * start
+        work.sums[edge, START_END] += weight * start * end
+        work.sums[edge, END_END] += weight * end * end
+        piece = int(work.pieces[piece, NEXT]) - 1
 
 
 @kernel
@@ -198,75 +180,6 @@ def _empty_squares(points: FloatArray, edges: IntArray, size: int, work: Workspa
         normal[u + 1, v] += both * x * y
         normal[u + 1, v + 1] += both * y * y
         work.sums[edge, START_START] = work.sums[edge, START_END] = work.sums[edge, END_END] = 0.0
-
-
-@kernel
-def _scaled_row(
-    m: int, residual: float, row: int, column: int, rows: FloatArray, weight_sum: FloatArray
-) -> float:  # fmt: skip
-    """Multiply a pixel's row of the Jacobian, `rows[:m]`, by the root of its weight; return the residual times that."""
-    if weight_sum.shape[0] == 0:
-        return residual
-    root = np.sqrt(weight_sum[row, column + 1] - weight_sum[row, column])
-    for a in range(m):
-        rows[a, 0] *= root
-        rows[a, 1] *= root
-    return residual * root
-
-
-@kernel
-def _add_outer_product(
-    m: int, residual: float, vertices: IntArray, rows: FloatArray, gradient: FloatArray, normal: FloatArray
-) -> None:  # fmt: skip
-    """Add one cell's row of the Jacobian, `rows[:m]` at `vertices[:m]`, to J'r and to the lower triangle of J'J."""
-    for a in range(m):
-        u = 2 * vertices[a]
-        jx, jy = rows[a, 0], rows[a, 1]
-        gradient[vertices[a], 0] += residual * jx
-        gradient[vertices[a], 1] += residual * jy
-        normal[u, u] += jx * jx
-        normal[u + 1, u] += jy * jx
-        normal[u + 1, u + 1] += jy * jy
-        for b in range(a):
-            v = 2 * vertices[b]
-            kx, ky = rows[b, 0], rows[b, 1]
-            if v < u:
-                normal[u, v] += jx * kx
-                normal[u, v + 1] += jx * ky
-                normal[u + 1, v] += jy * kx
-                normal[u + 1, v + 1] += jy * ky
-            else:
-                normal[v, u] += kx * jx
-                normal[v, u + 1] += kx * jy
-                normal[v + 1, u] += ky * jx
-                normal[v + 1, u + 1] += ky * jy
-
-
-@kernel
-def _cell_jacobian(
-    points: FloatArray, edges: IntArray, size: int, cell: int, work: Workspace, vertices: IntArray, rows: FloatArray
-) -> int:
-    """List the vertices that move the coverage of one cell, with d coverage / d (x, y); return how many they are."""
-    m = 0
-    piece = int(work.cells[cell, HEAD]) - 1
-    while piece >= 0:
-        edge = int(work.pieces[piece, EDGE])
-        i, j = edges[edge, 0], edges[edge, 1]
-        normal_x = (points[j, 1] - points[i, 1]) * size
-        normal_y = (points[i, 0] - points[j, 0]) * size
-        for vertex, weight in ((i, work.pieces[piece, START]), (j, work.pieces[piece, END])):
-            at = 0
-            while at < m and vertices[at] != vertex:
-                at += 1
-            if at == m:
-                vertices[m] = vertex
-                rows[m, 0] = 0.0
-                rows[m, 1] = 0.0
-                m += 1
-            rows[at, 0] += weight * normal_x
-            rows[at, 1] += weight * normal_y
-        piece = int(work.pieces[piece, NEXT]) - 1
-    return m
 
 
 @kernel

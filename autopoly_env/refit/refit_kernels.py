@@ -58,17 +58,17 @@ def refit(
     best.record[LOW], best.record[HIGH] = low, high
     loss_before = loss_at(unknowns, shape, fine, work, scratch)
 
-    _descend(unknowns, shape, pyramid, settings.first_level, settings, work, best)
+    reached = _descend(unknowns, shape, pyramid, settings.first_level, settings, work, best)
     if settings.n_far > 0:
         picture = pyramid[max(0, len(pyramid) - 3)]
         rebase(shape, picture, work, scratch, best)
         far_phase(unknowns, shape, picture, settings.n_far, work, best)
-        _descend(unknowns, shape, pyramid, len(pyramid) - 2, settings, work, best)
-    rebase(shape, fine, work, scratch, best)
-    reached = loss_at(unknowns, shape, fine, work, scratch)
+        reached = _descend(unknowns, shape, pyramid, len(pyramid) - 2, settings, work, best)
     if reached < 0.98 * best.record[LOSS]:  # the free search ended in a mesh that is not sane
         take_boundary(best.points, shape, unknowns)
         near_phase(unknowns, shape, fine, 0.0, True, settings, work, best)
+    if shape.rule.triples.shape[0] > 0:  # whose cost the best loss may hold
+        rebase(shape, fine, work, scratch, best)
     if best.record[LOSS] <= loss_before:
         _restore_idle(shape, fine, work, best)
     if not best.record[LOSS] < loss_before:
@@ -82,14 +82,14 @@ def refit(
 def _descend(
     unknowns: FloatArray, shape: Shape, pyramid: tuple[Picture, ...], first_level: int, settings: Settings,
     work: Workspace, best: Progress,
-) -> None:  # fmt: skip
-    """Near phase from `first_level` of the pyramid to its last, each level less stiff than the one before."""
-    scratch = np.empty_like(unknowns)
+) -> float:  # fmt: skip
+    """Near phase from `first_level` of the pyramid to its last, each less stiff than the one before; the last loss."""
+    loss = np.inf
     last = len(pyramid) - 1
     for level in range(max(0, first_level), last + 1):
         stiffness = 0.0 if level == last else settings.stiffness * 0.3 ** max(0, level - 1)
-        rebase(shape, pyramid[level], work, scratch, best)
-        near_phase(unknowns, shape, pyramid[level], stiffness, False, settings, work, best)
+        loss = near_phase(unknowns, shape, pyramid[level], stiffness, False, settings, work, best)
+    return loss
 
 
 @kernel

@@ -39,13 +39,13 @@ class RefitConfig:
     n_far: int = 0  # Adam steps that try to leave the optimum found, 0 for none
     stiffness: float = 0.1  # elastic term on the second level; 0.3 of it on the next, none on the last
     damping: float = 0.05  # absolute damping, in squared pixels: holds vertices that slide along a straight edge
-    tolerance: float = 1e-3  # relative gain of a step below which a level is done
+    tolerance: float = 2e-3  # relative gain of a step below which a level is done
     keep_defects: bool = False  # allow new self-intersections and flipped faces
 
 
 DEFAULT = RefitConfig()
 FROM_AFAR = RefitConfig(n_far=60)  # nothing is known of the start
-THOROUGH = RefitConfig(first_level=1, n_far=60)  # the start is roughly right
+THOROUGH = RefitConfig(first_level=1, n_far=20)  # the start is roughly right
 LOCAL = RefitConfig(first_level=2)  # the start nearly fits
 
 

@@ -39,7 +39,8 @@ def hinge(
 ) -> float:
     """What the corners that turn too little cost, and inner vertices that do not follow their neighbours.
 
-    Adds half the gradient J'r to `gradient` (N, 2) and J'J to the lower triangle of `normal` (2N, 2N), both per pixel.
+    Adds half the gradient J'r to `gradient` (N, 2) and J'J to the lower triangle of `normal` (2N, 2N), both per pixel;
+    an empty `normal` is left alone.
     """
     if rule.triples.shape[0] == 0:
         return 0.0
@@ -63,7 +64,7 @@ def hinge(
         for i in range(6):
             u, k = rule.triples[c, i >> 1], i & 1
             gradient[u, k] += _WEIGHT * residual * slope[i]
-            for j in range(6):
+            for j in range(6 if normal.shape[0] > 0 else 0):
                 v = rule.triples[c, j >> 1]
                 if 2 * v + (j & 1) <= 2 * u + k:
                     normal[2 * u + k, 2 * v + (j & 1)] += _WEIGHT * slope[i] * slope[j]
@@ -90,7 +91,7 @@ def _following(
             for m in range(first - 1, last):
                 u, slope = (v, 1.0) if m < first else (rule.neighbours[m], share)
                 gradient[u, axis] += _FOLLOWING * residual * slope
-                for n in range(first - 1, last):
+                for n in range(first - 1, last if normal.shape[0] > 0 else first - 1):
                     w, other = (v, 1.0) if n < first else (rule.neighbours[n], share)
                     if w <= u:
                         normal[2 * u + axis, 2 * w + axis] += _FOLLOWING * slope * other

@@ -70,6 +70,8 @@ class Progress(NamedTuple):
 LOSS, MOST_CROSSINGS, MOST_FLIPPED, N_EVALUATIONS = 0, 1, 2, 3
 LOW, HIGH = 4, 5  # of the box that positions stay in
 MOST_HAIRLINES = 6
+_SWEEPS = 30  # over the vertices off the boundary, at most
+_SETTLED = 1e-7  # unit square, that one of them moves in a sweep
 
 
 @kernel
@@ -156,7 +158,8 @@ def spread(unknowns: FloatArray, shape: Shape, best: Progress) -> None:
         points[shape.boundary[n], 1] = unknowns[n, 1]
     if shape.inner.shape[0] == 0:
         return
-    for _sweep in range(30):
+    for _sweep in range(_SWEEPS):
+        longest = 0.0
         for k in range(shape.inner.shape[0]):
             v = shape.inner[k]
             first, last = shape.neighbour_offsets[k], shape.neighbour_offsets[k + 1]
@@ -165,7 +168,11 @@ def spread(unknowns: FloatArray, shape: Shape, best: Progress) -> None:
                 for m in range(first, last):
                     u = shape.neighbours[m]
                     move += points[u, axis] - start[u, axis]
-                points[v, axis] = min(max(start[v, axis] + move / (last - first), low), high)
+                place = min(max(start[v, axis] + move / (last - first), low), high)
+                longest = max(longest, abs(place - points[v, axis]))
+                points[v, axis] = place
+        if longest < _SETTLED:
+            return
 
 
 @kernel
@@ -203,6 +210,16 @@ def take_boundary(points: FloatArray, shape: Shape, unknowns: FloatArray) -> Non
     for k in range(shape.boundary.shape[0]):
         unknowns[k, 0] = points[shape.boundary[k], 0]
         unknowns[k, 1] = points[shape.boundary[k], 1]
+
+
+@kernel
+def is_at(unknowns: FloatArray, shape: Shape, best: Progress) -> bool:
+    """Whether the unknowns are those of the best mesh so far."""
+    for k in range(shape.boundary.shape[0]):
+        v = shape.boundary[k]
+        if best.points[v, 0] != unknowns[k, 0] or best.points[v, 1] != unknowns[k, 1]:
+            return False
+    return True
 
 
 @kernel

@@ -282,14 +282,22 @@ def test_gradient__equals_differences_of_shapelys_images() -> None:
     assert np.linalg.norm(gradient - expected) <= 1e-6 * np.linalg.norm(expected)
 
 
+def jacobians_by_edge(many: raster.Batch, n_edges: int, pixels: npt.NDArray[Any]) -> list[npt.NDArray[Any]]:
+    """Pull-backs of single pixels as (N * V, 2), by each edge alone; the batch holds one mesh, once for each pixel."""
+    edges, starts = many.edges.reshape(len(many), n_edges, 2), np.arange(len(many) + 1)
+    alone = [raster.Batch(many.points, edges[:, e].copy(), many.point_starts, starts) for e in range(n_edges)]
+    return [raster.coverage_vjp(batch, pixels) for batch in alone]
+
+
 @pytest.mark.parametrize("mesh", [RING, hourglass(), polygon(star(0, 12))], ids=["ring", "pinch", "concave"])
-def test_normal_equations__equal_those_of_the_dense_jacobian(mesh: PolyMesh) -> None:
+def test_normal_equations__equal_those_of_each_edges_dense_jacobian(mesh: PolyMesh) -> None:
     size, batch = 9, raster.batch_of([mesh])
     n = len(mesh.vertices)
     # the rows of the Jacobian (R*R, 2V) are pull-backs of single pixels
     many = raster.batch_of([mesh] * size**2)
     pixels = np.eye(size**2).reshape(size**2, size, size)
     jacobian = raster.coverage_vjp(many, pixels).reshape(size**2, 2 * n) / size
+    by_edge = jacobians_by_edge(many, len(batch.edges), pixels)
     target = random_target(size)
     residual = (coverage(mesh, size) - target.coverage).ravel()
     work = raster.workspace(size, len(batch.edges))
@@ -299,7 +307,9 @@ def test_normal_equations__equal_those_of_the_dense_jacobian(mesh: PolyMesh) -> 
     assert_clean(size, len(batch.edges))
     assert loss == pytest.approx(residual @ residual, rel=1e-12)
     np.testing.assert_allclose(gradient.ravel(), jacobian.T @ residual, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(normal, np.tril(jacobian.T @ jacobian), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(sum(by_edge).reshape(size**2, 2 * n) / size, jacobian, rtol=0, atol=1e-12)
+    expected = sum(one.T @ one for one in (each.reshape(size**2, 2 * n) / size for each in by_edge))
+    np.testing.assert_allclose(normal, np.tril(expected), rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("resolution", [1, 10, 64, 130])
