@@ -21,7 +21,8 @@ def outlines() -> None:
     points.setflags(write=False)  # as those of meshes are
     around, hole = np.arange(4), np.arange(4, 8)
     polygon = partition_kernels.bridged(points, around, hole, np.cumsum([0, 4]), 0)
-    partition_kernels.cut(points, polygon, LEAST_SINE, 0.0)
+    seen = partition_kernels.visible(points, polygon)
+    partition_kernels.cut(points, polygon, seen, LEAST_SINE, 0.0)
     topology = PolyMesh.rectangle(0.1, 0.1, 0.9, 0.9).topology
     partition_kernels.bend(square.copy(), topology.corners, topology.face_offsets, BENT_SINE, 1)
     turns(square.copy(), topology.corners, topology.face_offsets)

@@ -9,7 +9,7 @@ from agents.climb.moves import neighbours
 from agents.finish.align import aligned
 from agents.quads.mirror import symmetric_neighbours, symmetrised
 from agents.quads.moves import quad_neighbours, quad_shaken
-from agents.quads.partition import MOST_BENT, Partition, bent, least_faces, mesh_of, partitioned
+from agents.quads.partition import MOST_BENT, Cuts, Partition, bent, least_faces, mesh_of
 from agents.trace.outline import Outline
 from agents.trace.rings import trace_rings
 from autopoly_env.compute import map_threads
@@ -47,11 +47,12 @@ class QuadHill:
 
     def place(self, outline: Outline, iou: float | None = None) -> QuadPlace:
         """The outline as it is, cut at its best, or bent a little where that saves faces; `iou` where it is known."""
-        partition = partitioned(outline)
+        cuts = Cuts(outline)
+        partition = cuts.best()
         place = self._cut(outline, partition, self._iou(outline) if iou is None else iou)
         if partition is not None and len(partition.faces) <= least_faces(outline):
             return place
-        relaxed = partitioned(outline, MOST_BENT)
+        relaxed = cuts.best(MOST_BENT)
         if relaxed is None or (partition is not None and len(relaxed.faces) >= len(partition.faces)):
             return place
         mesh = bent(mesh_of(outline, relaxed), self.simulator.guidance.bonds(outline.loops))

@@ -7,12 +7,14 @@ bridge, which becomes an edge of the mesh; which bridges are best is searched fr
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import takewhile
+from typing import NamedTuple
 
 import numpy as np
 
 from agents.quads import partition_kernels
 from agents.trace.outline import Outline
-from autopoly_env.arrays import FloatArray
+from autopoly_env.arrays import BoolArray, FloatArray, IntArray
 from autopoly_env.mesh import Face, PolyMesh, Topology, is_sane
 from autopoly_env.mesh.corner_kernels import turns
 from autopoly_env.mesh.symmetry import mirrored
@@ -27,6 +29,13 @@ _MANY_HOLES = 4  # from which on one way is tried only
 _N_BRIDGES = 3  # ways to join a hole that are tried, the shortest first
 
 
+class _Way(NamedTuple):
+    """A part of an outline as one polygon."""
+
+    polygon: IntArray  # (n,) indices of the outline's vertices; those of bridges come twice
+    seen: BoolArray  # (n, n) which corners see each other
+
+
 @dataclass(frozen=True)
 class Partition:
     """The faces, as indices of the outline's vertices, ring after ring."""
@@ -39,22 +48,36 @@ class Partition:
         return sum(len(face) == 4 for face in self.faces)
 
 
-def partitioned(outline: Outline, bend: float = 0.0) -> Partition | None:
-    """The best cut that was found; None where there is none. Corners of quads may lack so much sine."""
-    points = outline.loops.vertices
-    cycles = outline.loops.faces
-    faces: list[Face] = []
-    cost = 0.0
-    for k, ring in enumerate(outline.rings):
-        if ring.is_hole:
-            continue
-        holes = [cycles[h] for h, other in enumerate(outline.rings) if other.parent == k]
-        found = _best_of_part(points, cycles[k], holes, bend)
-        if found is None:
-            return None
-        faces += found.faces
-        cost += found.cost
-    return Partition(tuple(faces), cost)
+class Cuts:
+    """An outline that is to be cut: what its corners see of each other is found once, for cuts of every kind."""
+
+    def __init__(self, outline: Outline) -> None:
+        self._points = outline.loops.vertices
+        cycles = outline.loops.faces
+        self._parts = [
+            _ways_to_walk(
+                self._points, cycles[k], [cycles[h] for h, other in enumerate(outline.rings) if other.parent == k]
+            )
+            for k, ring in enumerate(outline.rings)
+            if not ring.is_hole
+        ]
+
+    def best(self, bend: float = 0.0) -> Partition | None:
+        """The best cut that was found; None where there is none. Corners of quads may lack so much sine."""
+        faces: list[Face] = []
+        cost = 0.0
+        for ways in self._parts:
+            found = _best_of_part(self._points, ways, bend)
+            if found is None:
+                return None
+            faces += found.faces
+            cost += found.cost
+        return Partition(tuple(faces), cost)
+
+
+def partitioned(outline: Outline) -> Partition | None:
+    """The best cut that was found; None where there is none."""
+    return Cuts(outline).best()
 
 
 def least_faces(outline: Outline) -> int:
@@ -90,20 +113,23 @@ def mesh_of(outline: Outline, partition: Partition) -> PolyMesh:
     return PolyMesh(outline.loops.vertices, topology, tuple(range(n)), tuple(range(f)), n, f)
 
 
-def _best_of_part(points: FloatArray, around: Face, holes: Sequence[Face], bend: float) -> Partition | None:
+def _ways_to_walk(points: FloatArray, around: Face, holes: Sequence[Face]) -> list[_Way]:
+    """A part as one polygon; with holes, a few ways of joining them. None of those that are too long."""
     if len(around) + sum(map(len, holes)) + 2 * len(holes) > MOST_CORNERS:
-        return None
-    if not holes:
-        ways = iter([np.array(around)])
-    else:
+        return []
+    polygons = [np.array(around)]
+    if holes:
         flat, offsets = np.concatenate([np.array(hole) for hole in holes]), np.cumsum([0, *map(len, holes)])
         ranks = range(_N_BRIDGES if len(holes) < _MANY_HOLES else 1)
-        ways = (partition_kernels.bridged(points, np.array(around), flat, offsets, rank) for rank in ranks)
+        bridged = (partition_kernels.bridged(points, polygons[0], flat, offsets, rank) for rank in ranks)
+        polygons = list(takewhile(len, bridged))
+    return [_Way(polygon, partition_kernels.visible(points, polygon)) for polygon in polygons]
+
+
+def _best_of_part(points: FloatArray, ways: Sequence[_Way], bend: float) -> Partition | None:
     best_cost, best_faces = np.inf, np.empty((0, 4), np.int64)
-    for polygon in ways:
-        if not len(polygon):
-            break
-        cost, faces = partition_kernels.cut(points, polygon, LEAST_SINE, bend)
+    for polygon, seen in ways:
+        cost, faces = partition_kernels.cut(points, polygon, seen, LEAST_SINE, bend)
         if cost < best_cost:
             best_cost, best_faces = cost, faces
     if best_cost == np.inf:

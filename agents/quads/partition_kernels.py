@@ -104,14 +104,15 @@ def _worst_of_triangle(points: FloatArray, a: int, b: int, c: int) -> float:
 
 
 @kernel
-def cut(points: FloatArray, names: IntArray, least_sine: float, bend: float) -> tuple[float, IntArray]:
+def cut(points: FloatArray, names: IntArray, seen: BoolArray, least_sine: float, bend: float) -> tuple[float, IntArray]:
     """The least cost of cutting a polygon, whose corners are `names` (n,) of the points, and its faces (m, 4).
 
-    Of a triangle the last entry is -1. The cost is inf, and there are no faces, where it cannot be cut.
+    `seen` (n, n) says which corners are `visible` to each other. Of a triangle the last entry is -1. The
+    cost is inf, and there are no faces, where it cannot be cut.
     """
     n = len(names)
     corners = points[names]
-    costs, chosen = least_costs(corners, names, visible(points, names), least_sine, bend)
+    costs, chosen = least_costs(corners, names, seen, least_sine, bend)
     if n < 3 or costs[0, n - 1] == np.inf:
         return np.inf, np.empty((0, 4), np.int64)
     faces = np.empty((n - 2, 4), np.int64)

@@ -143,7 +143,7 @@ class PolyMesh:
         return self._naming() == other._naming() and np.array_equal(self.vertices, other.vertices)
 
     def __hash__(self) -> int:
-        return hash(self._naming())
+        return hash((self._naming(), (self.vertices + 0.0).tobytes()))  # 0.0 and -0.0 are equal
 
     def _naming(self) -> tuple[Topology, tuple[int, ...], tuple[int, ...], int, int]:
         return self.topology, self.vertex_ids, self.face_ids, self.next_vertex_id, self.next_face_id

@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from agents.quads.hill import complexity_of
-from agents.quads.partition import LEAST_SINE, MOST_BENT, bent, least_faces, mesh_of, partitioned
+from agents.quads.partition import LEAST_SINE, MOST_BENT, Cuts, bent, least_faces, mesh_of, partitioned
 from agents.trace.outline import Outline
 from agents.trace.rings import Ring
 from autopoly_env.arrays import FloatArray
@@ -110,7 +110,7 @@ def test_rings__are_cut_with_their_holes(seed: int) -> None:
 
 def test_straight_corners__are_bent_where_that_saves_faces() -> None:
     shape = outline(TABLET)
-    strict, relaxed = partitioned(shape), partitioned(shape, MOST_BENT)
+    strict, relaxed = Cuts(shape).best(), Cuts(shape).best(MOST_BENT)
     assert strict is not None and relaxed is not None
     assert len(relaxed.faces) == least_faces(shape) == 3 < len(strict.faces)
     mesh = bent(mesh_of(shape, relaxed))
