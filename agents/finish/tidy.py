@@ -65,8 +65,7 @@ def _has_edge(mesh: PolyMesh, a: int, b: int) -> bool:
     ids = mesh.vertex_ids
     if a not in ids or b not in ids:
         return False
-    i, j = sorted((mesh.vertex_index(a), mesh.vertex_index(b)))
-    return (i, j) in mesh.topology.edge_lookup
+    return mesh.topology.edge_at(mesh.vertex_index(a), mesh.vertex_index(b)) >= 0
 
 
 def _without(

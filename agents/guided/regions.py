@@ -66,9 +66,9 @@ def _segment(mesh: PolyMesh, base: str, element: int) -> tuple[FloatArray, Float
         return first, last
     if base == "vertex":
         return mesh.vertices[element], mesh.vertices[element]
-    links = mesh.topology.links
-    corner = mesh.vertices[links.tails[element]]
-    middle = mesh.vertices[list(mesh.faces[links.faces[element]])].mean(axis=0)
+    f, i = mesh.topology.corner(element)
+    face = mesh.faces[f]
+    corner, middle = mesh.vertices[face[i]], mesh.vertices[list(face)].mean(axis=0)
     return corner, corner + _CORNER_REACH * (middle - corner)
 
 

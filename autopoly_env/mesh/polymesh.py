@@ -111,11 +111,11 @@ class PolyMesh:
 
     @cached_property
     def _vertex_of_id(self) -> dict[int, int]:
-        return {name: v for v, name in enumerate(self.vertex_ids)}
+        return dict(zip(self.vertex_ids, range(len(self.vertex_ids)), strict=True))
 
     @cached_property
     def _face_of_id(self) -> dict[int, int]:
-        return {name: f for f, name in enumerate(self.face_ids)}
+        return dict(zip(self.face_ids, range(len(self.face_ids)), strict=True))
 
     def vertex_index(self, vertex_id: int) -> int:
         """The index of the vertex with this id. Raises MeshError if there is none."""
@@ -131,8 +131,8 @@ class PolyMesh:
 
     def edge_index(self, a: int, b: int) -> int:
         """The index of the edge between the vertex indices a and b. Raises MeshError if there is none."""
-        edge = self.topology.edge_lookup.get((a, b) if a < b else (b, a))
-        if edge is None:
+        edge = self.topology.edge_at(a, b)
+        if edge < 0:
             raise MeshError(f"no edge joins vertices {a} and {b}; give the two ends of an edge")
         return edge
 

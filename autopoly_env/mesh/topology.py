@@ -12,6 +12,9 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from autopoly_env.arrays import BoolArray, IntArray
+from autopoly_env.mesh.flat import Flat
+
+MANY = 256  # corners of a mesh from which on single elements are looked up without tables of all
 
 Face = tuple[int, ...]
 _Array = TypeVar("_Array", IntArray, BoolArray)
@@ -64,6 +67,46 @@ class Topology:
         return HalfEdges(tails, heads, owners, following, twins, offsets)
 
     @cached_property
+    def _flat(self) -> Flat | None:
+        """The arrays to look single elements up in; None where tables of all are as quick."""
+        return Flat.of(self.n_vertices, self.faces) if self.n_corners >= MANY else None
+
+    def edge_at(self, a: int, b: int) -> int:
+        """The index of the edge between two vertex indices, -1 if there is none."""
+        if self._flat is not None:
+            return self._flat.edge(a, b)
+        return self.edge_lookup.get((a, b) if a < b else (b, a), -1)
+
+    def sides(self, edge: int) -> tuple[int, int]:
+        """One of `edge_half_edges`."""
+        if self._flat is not None and "edge_half_edges" not in vars(self):
+            return self._flat.sides(edge)
+        return self.edge_half_edges[edge]
+
+    def ends(self, half_edge: int) -> tuple[int, int]:
+        """The vertices that a half-edge runs from and to."""
+        f, i = self.corner(half_edge)
+        face = self.faces[f]
+        return face[i], face[i + 1 - len(face)]
+
+    def corner(self, half_edge: int) -> tuple[int, int]:
+        """The face of a corner (= half-edge), and the corner's position in it."""
+        if self._flat is not None:
+            return self._flat.corner(half_edge)
+        face = self.links.faces[half_edge]
+        return face, half_edge - self.links.offsets[face]
+
+    def first_corner(self, face: int) -> int:
+        """The number of the first corner (= half-edge) of a face."""
+        return self.links.offsets[face] if self._flat is None else int(self._flat.offsets[face])
+
+    def lone_corner(self, vertex: int) -> int:
+        """One of `lone_corners`."""
+        if self._flat is not None and "lone_corners" not in vars(self):
+            return self._flat.lone_corner(vertex)
+        return self.lone_corners[vertex]
+
+    @cached_property
     def edge_lookup(self) -> dict[tuple[int, int], int]:
         """Edge index by its two vertex indices, the lower one first."""
         links = self.links
@@ -93,7 +136,8 @@ class Topology:
     @cached_property
     def edges(self) -> IntArray:
         """(E,2) vertex indices, ascending within a row and from row to row."""
-        return _read_only(np.array(list(self.edge_lookup), np.int64))
+        rows = np.array(list(self.edge_lookup), np.int64) if self._flat is None else self._flat.edges
+        return _read_only(rows)
 
     @cached_property
     def edge_half_edges(self) -> list[tuple[int, int]]:
@@ -201,7 +245,12 @@ class Topology:
 
     @property
     def n_edges(self) -> int:
-        return len(self.edge_lookup)
+        return len(self.edge_lookup) if self._flat is None else len(self._flat.keys)
+
+    @cached_property
+    def n_corners(self) -> int:
+        """H, of which every face has as many as vertices."""
+        return sum(map(len, self.faces))
 
     @property
     def n_faces(self) -> int:

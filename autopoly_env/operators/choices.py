@@ -55,7 +55,8 @@ _HOLE = TypeAdapter(_Hole)
 
 def _corner_choice_ids(mesh: PolyMesh, _corner: int, choice: Choice) -> ChoiceIds:
     assert isinstance(choice, int | np.integer)
-    return {"to": mesh.vertex_ids[mesh.topology.links.tails[int(choice)]]}
+    face, i = mesh.topology.corner(int(choice))
+    return {"to": mesh.vertex_ids[mesh.faces[face][i]]}
 
 
 def _corner_choice(mesh: PolyMesh, corner: int, ids: ChoiceIds) -> Choice:
@@ -64,9 +65,8 @@ def _corner_choice(mesh: PolyMesh, corner: int, ids: ChoiceIds) -> Choice:
     to = ids["to"]
     if isinstance(to, bool) or not isinstance(to, int) or to < 0:
         raise SequenceError(f"choice.to is {short(to)}; give an id, an integer from 0")
-    links = mesh.topology.links
-    face = links.faces[corner]
-    return links.offsets[face] + corner_position(mesh, face, to)
+    face, _ = mesh.topology.corner(corner)
+    return mesh.topology.first_corner(face) + corner_position(mesh, face, to)
 
 
 def _vertex_choice_ids(mesh: PolyMesh, _vertex: int, choice: Choice) -> ChoiceIds:

@@ -26,7 +26,7 @@ def cap(mesh: PolyMesh, edge: int, _choice: Choice | None) -> PolyMesh:
 
     It is `HEIGHT` of the edge's length high, halved as the quad of `edge_extrude` is, in which it lies.
     """
-    if mesh.topology.edge_half_edges[edge][1] >= 0:
+    if mesh.topology.sides(edge)[1] >= 0:
         raise refusal("edge_cap", "edge", edge, "it lies between two faces; choose a boundary edge")
     a, b = ends_along_face(mesh, edge)
     height, _ = clear_extrusion(mesh.vertices, mesh.edges, a, b, HEIGHT, INSET, MAX_HALVINGS)

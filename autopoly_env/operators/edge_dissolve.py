@@ -20,11 +20,11 @@ def dissolvable_edges(mesh: PolyMesh) -> BoolArray:
 
 
 def _defect(mesh: PolyMesh, edge: int) -> str | None:
-    h, g = mesh.topology.edge_half_edges[edge]
+    h, g = mesh.topology.sides(edge)
     if g < 0:
         return "it has one face only; choose an edge between two faces"
-    owners = mesh.topology.links.faces
-    if len(set(mesh.faces[owners[h]]).intersection(mesh.faces[owners[g]])) > 2:
+    one, other = mesh.faces[corner_of(mesh, h)[0]], mesh.faces[corner_of(mesh, g)[0]]
+    if len(set(one).intersection(other)) > 2:
         return "its two faces share more than this edge; choose another"
     return None
 
@@ -34,7 +34,7 @@ def dissolve(mesh: PolyMesh, edge: int, _choice: Choice | None) -> PolyMesh:
     defect = _defect(mesh, edge)
     if defect is not None:
         raise refusal("edge_dissolve", "edge", edge, defect)
-    h, g = mesh.topology.edge_half_edges[edge]
+    h, g = mesh.topology.sides(edge)
     (f, i), (other, j) = corner_of(mesh, h), corner_of(mesh, g)
     face, joined = mesh.faces[f], mesh.faces[other]
     detour = (*joined[j:], *joined[:j])[2:]  # round the other face from the end of the edge back to its start

@@ -34,7 +34,7 @@ def extrude(mesh: PolyMesh, edge: int, _choice: Choice | None) -> PolyMesh:
     It stands off by `OFFSET` of the edge's length, halved up to `MAX_HALVINGS` times while the quad meets another edge
     of the mesh, be it straight or narrowed by `INSET` of the edge's length at either end.
     """
-    if mesh.topology.edge_half_edges[edge][1] >= 0:
+    if mesh.topology.sides(edge)[1] >= 0:
         raise refusal("edge_extrude", "edge", edge, "it lies between two faces; choose a boundary edge")
     (a, b), new = ends_along_face(mesh, edge), len(mesh.vertex_ids)
     offset, inset = clear_extrusion(mesh.vertices, mesh.edges, a, b, OFFSET, INSET, MAX_HALVINGS)

@@ -61,13 +61,13 @@ def fill(mesh: PolyMesh, edge: int, choice: Choice | None) -> PolyMesh:
 
 def _corners(mesh: PolyMesh, edge: int, other: Choice | None) -> Face | str:
     """The corners of the face between two edges, or why there can be none."""
-    if mesh.topology.edge_half_edges[edge][1] >= 0:
+    if mesh.topology.sides(edge)[1] >= 0:
         return "it lies between two faces; choose a boundary edge"
     if other is None:
         return "no convex face joins it with another boundary edge; choose one that faces it"
     if not isinstance(other, int | np.integer) or not 0 <= other < mesh.topology.n_edges:
         return f"{other!r} is no edge; give the boundary edge to fill to"
-    if other == edge or mesh.topology.edge_half_edges[other][1] >= 0:
+    if other == edge or mesh.topology.sides(int(other))[1] >= 0:
         return f"edge {other} is not another boundary edge; give one"
     (a, b), (c, d) = ends_along_face(mesh, edge), ends_along_face(mesh, int(other))
     corners = tuple(dict.fromkeys((b, a, d, c)))
@@ -84,10 +84,10 @@ def _corners(mesh: PolyMesh, edge: int, other: Choice | None) -> Face | str:
 
 def _is_free(mesh: PolyMesh, v: int, w: int) -> bool:
     """Whether a new face may run from v to w: along no edge, or against the only face of one."""
-    edge = mesh.topology.edge_lookup.get((min(v, w), max(v, w)))
-    if edge is None:
+    edge = mesh.topology.edge_at(v, w)
+    if edge < 0:
         return True
-    return mesh.topology.edge_half_edges[edge][1] < 0 and ends_along_face(mesh, edge) == (w, v)
+    return mesh.topology.sides(edge)[1] < 0 and ends_along_face(mesh, edge) == (w, v)
 
 
 # --- where it starts

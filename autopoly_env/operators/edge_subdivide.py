@@ -13,7 +13,7 @@ from autopoly_env.operators.elements import EDGE
 from autopoly_env.operators.evidence import Evidence, sane_move
 from autopoly_env.operators.mirroring import again, moved
 from autopoly_env.operators.operator import Mirroring, Operator
-from autopoly_env.operators.rebuilding import corner_of, grown
+from autopoly_env.operators.rebuilding import corner_of, ends_along_face, grown
 from autopoly_env.operators.wording import Gesture, Phrases, Told, begun_with
 
 
@@ -26,7 +26,7 @@ def subdivide(mesh: PolyMesh, edge: int, _choice: Choice | None) -> PolyMesh:
     """A new vertex at the midpoint of the edge; the faces beside it keep their other corners."""
     new = len(mesh.vertex_ids)
     faces = list(mesh.faces)
-    for h in mesh.topology.edge_half_edges[edge]:
+    for h in mesh.topology.sides(edge):
         if h >= 0:
             f, i = corner_of(mesh, h)
             faces[f] = (*faces[f][: i + 1], new, *faces[f][i + 1 :])
@@ -34,8 +34,8 @@ def subdivide(mesh: PolyMesh, edge: int, _choice: Choice | None) -> PolyMesh:
 
 
 def _middle(mesh: PolyMesh, edge: int) -> FloatArray:
-    h, links = mesh.topology.edge_half_edges[edge][0], mesh.topology.links
-    middle: FloatArray = 0.5 * (mesh.vertices[links.tails[h]] + mesh.vertices[links.heads[h]])
+    tail, head = ends_along_face(mesh, edge)
+    middle: FloatArray = 0.5 * (mesh.vertices[tail] + mesh.vertices[head])
     return middle
 
 

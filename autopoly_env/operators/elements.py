@@ -45,7 +45,7 @@ _COUNTS: dict[str, Callable[[PolyMesh], int]] = {
     "vertex": lambda mesh: len(mesh.vertex_ids),
     "edge": lambda mesh: mesh.topology.n_edges,
     "face": lambda mesh: len(mesh.face_ids),
-    "corner": lambda mesh: len(mesh.topology.links.tails),
+    "corner": lambda mesh: mesh.topology.n_corners,
 }
 
 
@@ -69,10 +69,10 @@ def _edge_ids(mesh: PolyMesh, edge: int) -> ElementIds:
 def _edge_index(mesh: PolyMesh, ids: ElementIds) -> int:
     match ids:
         case {"edge": [a, b], **rest} if not rest:
-            i, j = sorted((mesh.vertex_index(a), mesh.vertex_index(b)))
-            if (i, j) not in mesh.topology.edge_lookup:
+            edge = mesh.topology.edge_at(mesh.vertex_index(a), mesh.vertex_index(b))
+            if edge < 0:
                 raise SequenceError(f"no edge joins vertices {a} and {b}; give the two ends of an edge")
-            return mesh.edge_index(i, j)
+            return edge
     raise no_such_element("edge", ids)
 
 
@@ -104,15 +104,15 @@ def _vertex_index(mesh: PolyMesh, ids: ElementIds) -> int:
 
 
 def _corner_ids(mesh: PolyMesh, corner: int) -> ElementIds:
-    links = mesh.topology.links
-    return {"face": mesh.face_ids[links.faces[corner]], "vertex": mesh.vertex_ids[links.tails[corner]]}
+    face, i = mesh.topology.corner(corner)
+    return {"face": mesh.face_ids[face], "vertex": mesh.vertex_ids[mesh.faces[face][i]]}
 
 
 def _corner_index(mesh: PolyMesh, ids: ElementIds) -> int:
     match ids:
         case {"face": int(face), "vertex": int(vertex), **rest} if not rest:
             f = mesh.face_index(face)
-            return mesh.topology.links.offsets[f] + corner_position(mesh, f, vertex)
+            return mesh.topology.first_corner(f) + corner_position(mesh, f, vertex)
     raise no_such_element("corner", ids)
 
 

@@ -40,7 +40,7 @@ def most_even_diagonal(mesh: PolyMesh, corner: int) -> int | None:
     least = costs.min()
     if least == np.inf:
         return None
-    start = mesh.topology.links.offsets[corner_of(mesh, corner)[0]]
+    start = mesh.topology.first_corner(corner_of(mesh, corner)[0])
     return start + int(np.flatnonzero(costs <= least + 1e-12)[0])
 
 
@@ -54,7 +54,7 @@ def split(mesh: PolyMesh, corner: int, choice: Choice | None) -> PolyMesh:
     if not isinstance(choice, int | np.integer):
         raise refusal("face_split", "corner", corner, f"{choice!r} is no corner; give the corner to split to")
     f, i = corner_of(mesh, corner)
-    face, j = mesh.faces[f], int(choice) - mesh.topology.links.offsets[f]
+    face, j = mesh.faces[f], int(choice) - mesh.topology.first_corner(f)
     if not 0 <= j < len(face) or not _is_free(mesh, face, i, j):
         raise refusal(
             "face_split",
@@ -78,9 +78,10 @@ def _other_end(step: Told) -> int:
 
 def _blender(mesh: PolyMesh, corner: int, choice: Choice | None) -> list[Any]:
     assert isinstance(choice, int | np.integer)
-    tails, ids = mesh.topology.links.tails, mesh.vertex_ids
-    face, _ = corner_of(mesh, corner)
-    return [mesh.face_ids[face], *corners_from_last(mesh, face, ids[tails[corner]], ids[tails[int(choice)]])]
+    face, i = corner_of(mesh, corner)
+    _, j = corner_of(mesh, int(choice))
+    ends = [mesh.vertex_ids[mesh.faces[face][k]] for k in (i, j)]
+    return [mesh.face_ids[face], *corners_from_last(mesh, face, *ends)]
 
 
 face_split = Operator(

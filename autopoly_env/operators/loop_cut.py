@@ -149,9 +149,9 @@ def _twice(of: Mirroring, start: Start, strip: Strip, images: dict[int, tuple[in
     first, n = start.mesh, len(of.mesh.vertices)
     end = next(iter(images))
     a, b = images[end]
-    edge = first.topology.edge_lookup.get((min(a, b), max(a, b)))
-    opposite = "gone" if edge is None else strip_through(first, edge)
-    if edge is None or isinstance(opposite, str) or not isinstance(start.choice, float):
+    edge = first.topology.edge_at(a, b)
+    opposite = "gone" if edge < 0 else strip_through(first, edge)
+    if isinstance(opposite, str) or not isinstance(start.choice, float):
         return  # the first loop runs through the opposite strip
     try:
         second, halfway = again(loop_cut, first, edge, start.choice if a < b else 1.0 - start.choice)

@@ -1,6 +1,7 @@
 """What operators are made of: meshes grown and shrunk, corners looked up, refusals that say why."""
 
 from collections.abc import Iterable, Sequence
+from itertools import repeat
 from typing import TypeVar
 
 import numpy as np
@@ -38,16 +39,16 @@ def grown(
 def shrunk(mesh: PolyMesh, faces: Sequence[Face], face_ids: tuple[int, ...]) -> PolyMesh:
     """The mesh with only `faces`; vertices that no face uses any more go."""
     used = set().union(*faces)
-    kept = [v for v in range(len(mesh.vertex_ids)) if v in used]
+    kept = sorted(used)
     if len(kept) == len(mesh.vertex_ids):
         vertices, renumbered = mesh.vertices, tuple(faces)
     else:
-        index = {v: i for i, v in enumerate(kept)}
-        vertices, renumbered = mesh.vertices[kept], tuple(tuple(index[v] for v in face) for face in faces)
+        index = dict(zip(kept, range(len(kept)), strict=True))
+        vertices, renumbered = mesh.vertices[kept], tuple(map(tuple, map(map, repeat(index.__getitem__), faces)))
     return PolyMesh(
         vertices,
         Topology(len(kept), renumbered),
-        tuple(mesh.vertex_ids[v] for v in kept),
+        tuple(map(mesh.vertex_ids.__getitem__, kept)),
         face_ids,
         mesh.next_vertex_id,
         mesh.next_face_id,
@@ -56,9 +57,7 @@ def shrunk(mesh: PolyMesh, faces: Sequence[Face], face_ids: tuple[int, ...]) -> 
 
 def corner_of(mesh: PolyMesh, corner: int) -> tuple[int, int]:
     """The face of a corner (= half-edge) and the corner's position in it."""
-    links = mesh.topology.links
-    face = links.faces[corner]
-    return face, corner - links.offsets[face]
+    return mesh.topology.corner(corner)
 
 
 def without(items: tuple[_Item, ...], i: int) -> tuple[_Item, ...]:
@@ -68,9 +67,7 @@ def without(items: tuple[_Item, ...], i: int) -> tuple[_Item, ...]:
 
 def ends_along_face(mesh: PolyMesh, edge: int) -> tuple[int, int]:
     """The ends of an edge, by index, as its (lower) face runs."""
-    half_edge, _ = mesh.topology.edge_half_edges[edge]
-    links = mesh.topology.links
-    return links.tails[half_edge], links.heads[half_edge]
+    return mesh.topology.ends(mesh.topology.sides(edge)[0])
 
 
 def rim_defect(mesh: PolyMesh, sides: Iterable[tuple[int, int]]) -> str:

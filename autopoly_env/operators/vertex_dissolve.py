@@ -22,7 +22,7 @@ def dissolvable_vertices(mesh: PolyMesh) -> BoolArray:
 
 
 def _defect(mesh: PolyMesh, vertex: int) -> str | None:
-    corner = mesh.topology.lone_corners[vertex]
+    corner = mesh.topology.lone_corner(vertex)
     if corner < 0:
         return "more than two edges or one face meet there; choose a boundary vertex of valence 2"
     f, i = corner_of(mesh, corner)
@@ -30,7 +30,7 @@ def _defect(mesh: PolyMesh, vertex: int) -> str | None:
     if len(face) == 3:
         return "its face is a triangle; choose a vertex of a larger face"
     a, b = face[i - 1], face[(i + 1) % len(face)]
-    if (min(a, b), max(a, b)) in mesh.topology.edge_lookup:
+    if mesh.topology.edge_at(a, b) >= 0:
         return "its two neighbours are joined by an edge already; choose another"
     return None
 
@@ -40,7 +40,7 @@ def dissolve(mesh: PolyMesh, vertex: int, _choice: Choice | None) -> PolyMesh:
     defect = _defect(mesh, vertex)
     if defect is not None:
         raise refusal("vertex_dissolve", "vertex", vertex, defect)
-    f, i = corner_of(mesh, mesh.topology.lone_corners[vertex])
+    f, i = corner_of(mesh, mesh.topology.lone_corner(vertex))
     return shrunk(mesh, (*mesh.faces[:f], without(mesh.faces[f], i), *mesh.faces[f + 1 :]), mesh.face_ids)
 
 

@@ -96,7 +96,7 @@ def _split_and_delete(dice: Dice, mesh: PolyMesh, outlines: set[tuple[int, ...]]
     split = _step(dice, "face_split", mesh, set())
     if split is None:
         return []
-    face = mesh.topology.links.faces[split.action.element]
+    face, _ = mesh.topology.corner(split.action.element)
     rest = _step(dice, "face_delete", split.mesh, outlines, dice.pick((face, len(mesh.faces))))
     return [split, rest] if rest else []
 
@@ -152,9 +152,8 @@ def _shaken(dice: Dice, mesh: PolyMesh, made: PolyMesh, action: Action, amount: 
 
 def _edge(mesh: PolyMesh, edge: int) -> tuple[FloatArray, FloatArray]:
     """The vector along a boundary edge, and the one as long that points out of the mesh."""
-    h, _ = mesh.topology.edge_half_edges[edge]
-    links = mesh.topology.links
-    along = mesh.vertices[links.heads[h]] - mesh.vertices[links.tails[h]]
+    tail, head = mesh.topology.ends(mesh.topology.sides(edge)[0])
+    along = mesh.vertices[head] - mesh.vertices[tail]
     return along, np.array([along[1], -along[0]])
 
 

@@ -43,7 +43,7 @@ def house(n_steps: int = len(STEPS), settings: dict[str, Any] | None = None) -> 
         choice = operator.choose(mesh, element)
         if to is not None:
             face = mesh.face_index(ids["face"])
-            choice = mesh.topology.links.offsets[face] + mesh.faces[face].index(mesh.vertex_index(to))
+            choice = mesh.topology.first_corner(face) + mesh.faces[face].index(mesh.vertex_index(to))
         mesh = operator.apply(mesh, element, choice)
         vertices = mesh.vertices.copy()
         for vertex, place in moves.items():

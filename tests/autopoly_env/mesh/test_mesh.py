@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from autopoly_env.errors import MeshError
-from autopoly_env.mesh import PolyMesh, Topology, canonical_hash, is_valid, validate
+from autopoly_env.mesh import PolyMesh, Topology, canonical_hash, is_valid, topology, validate
 from tests.helpers.strategies import meshes, random_walk
 
 SQUARE = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
@@ -313,3 +313,21 @@ def test_components_and_holes__are_the_parts_and_interiors_of_shapelys_union() -
     assert len(found) > 300
     assert sum(n_parts > 1 for n_parts, _ in found) > 20
     assert sum(n_holes > 0 for _, n_holes in found) > 100
+
+
+@given(mesh=meshes(60))
+def test_large_mesh__is_asked_about_single_elements_as_in_tables_of_all(mesh: PolyMesh) -> None:
+    table = mesh.topology
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(topology, "MANY", 0)
+        single = Topology(table.n_vertices, table.faces)
+        assert np.array_equal(single.edges, np.array(list(table.edge_lookup)))
+        assert [single.sides(e) for e in range(single.n_edges)] == table.edge_half_edges
+        assert [single.lone_corner(v) for v in range(table.n_vertices)] == table.lone_corners
+        assert [single.first_corner(f) for f in range(table.n_faces)] == table.links.offsets[:-1]
+        assert [single.corner(h)[0] for h in range(single.n_corners)] == table.links.faces
+        assert [single.ends(h) for h in range(single.n_corners)] == list(
+            zip(table.links.tails, table.links.heads, strict=True)
+        )
+        pairs = [(a, b) for a in range(table.n_vertices) for b in range(a)]
+        assert [single.edge_at(a, b) for a, b in pairs] == [table.edge_lookup.get((b, a), -1) for a, b in pairs]
