@@ -2,9 +2,11 @@
 
 import math
 import os
+import platform
 import shutil
 import tempfile
 import time
+import zlib
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -27,8 +29,9 @@ from autopoly_env.silhouette import Silhouette, thumbnail
 
 RESULTS = ("sequence.json", "mesh.obj", "mesh.svg", "steps.png", "player.html", "lesson.json")
 OVERVIEW = "overview.png"
-_STAGING = ".solve-"  # how folders begin in which results are completed; the number of the process follows
-_PATIENCE = 5.0  # seconds that a folder is left alone, lest one of another machine is taken
+_STAGING = ".solve-"  # how folders begin in which results are completed; the machine and the process's number follow
+_MACHINE = f"{zlib.crc32(platform.node().encode()):08x}-"
+_PATIENCE = 5.0  # seconds that a folder of another machine is left alone
 PAGE_SIZE = 3850  # pixels that an overview may have each way
 PICTURE_SHARE = 0.25  # of a mesh's width: how wide its picture is beside it
 CELL_SIZE = 256  # pixels of a mesh in it, if that fits
@@ -78,7 +81,7 @@ def write_results(
         in_the_way = next((folder / name for name in results if (folder / name).is_dir()), None)
         if in_the_way is not None:
             raise OutputError(f"cannot write {in_the_way} (a folder is in its place); move that away")
-        staging = Path(tempfile.mkdtemp(prefix=f"{_STAGING}{os.getpid()}-", suffix=".tmp", dir=folder.parent))
+        staging = Path(tempfile.mkdtemp(prefix=f"{_STAGING}{_MACHINE}{os.getpid()}-", suffix=".tmp", dir=folder.parent))
         try:
             solution.sequence.save(staging / "sequence.json")
             (staging / "mesh.obj").write_text(to_obj(solution.mesh), encoding="utf-8")
@@ -100,10 +103,11 @@ def write_results(
 
 
 def _sweep(folder: Path) -> None:
-    """Remove the staging folders of runs on this machine that are not there any more."""
+    """Remove the staging folders of runs that are not there any more, those of other machines once they are old."""
     for left in folder.glob(f"{_STAGING}*.tmp"):
-        owner = left.name.removeprefix(_STAGING).partition("-")[0]
-        if not (is_count(owner) and _is_running(int(owner))) and time.time() - left.stat().st_mtime > _PATIENCE:
+        owner = left.name.removeprefix(_STAGING + _MACHINE).partition("-")[0]
+        is_over = not _is_running(int(owner)) if is_count(owner) else time.time() - left.stat().st_mtime > _PATIENCE
+        if is_over:
             shutil.rmtree(left, ignore_errors=True)
 
 

@@ -18,6 +18,7 @@ from training.options import plain
 
 SUITES = sorted(path.stem for path in FOLDER.glob("*.yaml"))
 MINIMAL = "targets: {kind: construction, n: 2}\nagents: [{agent: trace}]\n"
+PRINTED = MINIMAL.replace("}]", ", printed: {r_sm: NUMBER, r_sc: 1, r_si: 0, r_all: 3}}]")
 
 
 def written(folder: Path, text: str) -> str:
@@ -76,6 +77,14 @@ def test_suite__read_back_from_its_plain_values_is_the_same(tmp_path: Path) -> N
         (MINIMAL.replace("construction", "clouds"), "does not match any of the expected tags"),
         (MINIMAL + "weights: {w_x: 1}", "weights.w_x: Unexpected keyword argument"),
         (MINIMAL + "weights: {w_sc: -1}", "w_sc = -1.0: expected a finite weight of at least 0"),
+        (
+            PRINTED.replace("NUMBER", ".nan"),
+            "agents.0.printed.r_sm: expected a finite number of at most 64 bits, got nan",
+        ),
+        (
+            PRINTED.replace("NUMBER", "1.0e+300"),
+            "agents.0.printed.r_sm: expected a finite number of at most 64 bits, got 1e+300",
+        ),
         (MINIMAL + "budget: {refits: many}", "budget.refits: Input should be a valid integer"),
         (MINIMAL + "budget: {refits: -1}", "a budget of -1 refits"),
         (MINIMAL + "seeds: []", "seeds (): expected at least one"),
