@@ -167,9 +167,10 @@ def _record(done: "Retargeted") -> dict[str, Any]:
 
 
 def _words(done: "Retargeted", n_steps: int, axis: float | None = None, *, keep_level: bool = False) -> str:
-    totals = (
-        f"{done.before.total:.2f} as it was, {done.refitted.total:.2f} refitted, {done.solution.score.total:.2f} now"
-    )
+    now = f"{done.solution.score.total:.2f} now"
+    if done.solution.score.total < done.refitted.total:
+        now += ", level and plumb" if keep_level else ", without hairlines"
+    totals = f"{done.before.total:.2f} as it was, {done.refitted.total:.2f} refitted, {now}"
     steps = f"steps: {done.n_kept} of {n_steps} kept, {done.n_dropped} dropped, {done.n_added} added"
     if done.begins_elsewhere:
         steps += (

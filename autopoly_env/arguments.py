@@ -38,6 +38,20 @@ def whole(name: str, value: Any, at_least: int = 0, at_most: int = LARGEST) -> i
     return int(value)
 
 
+def at_least(bound: float, **values: float) -> None:
+    """Raise ConfigError that names the first of the values which is no finite number of at least so much."""
+    for name, value in values.items():
+        if not bound <= value < math.inf:
+            raise ConfigError(f"{name}={short(value)}: expected a number of at least {bound:g}")
+
+
+def above(bound: float, **values: float) -> None:
+    """Raise ConfigError that names the first of the values which is no finite number above so much."""
+    for name, value in values.items():
+        if not bound < value < math.inf:
+            raise ConfigError(f"{name}={short(value)}: expected a number above {bound:g}")
+
+
 def number(name: str, value: Any) -> float:
     """The value, a finite number. Raises ConfigError otherwise."""
     found = float("nan")

@@ -1,12 +1,11 @@
 """What trainings say: durations in words, their settings with what they mean, their metrics as a table."""
 
 import inspect
+import json
 import re
 from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import asdict, fields, is_dataclass
 from typing import Any
-
-from autopoly_env.shown import short
 
 BASELINES = ("residual", "majority", "chance", "least")  # how names of metrics end that others are measured against
 _FIELD = re.compile(r"^    (\w+): [^#\n]*?(?:  # (.*))?$", re.MULTILINE)
@@ -20,7 +19,7 @@ def duration(seconds: float) -> str:
 
 
 def settings_of(config: Any, prefix: str = "") -> list[str]:
-    """A line for every SECTION.KEY of nested dataclasses: its value, and what the comment beside it says."""
+    """A line for every SECTION.KEY of nested dataclasses: its value, whole and as it is given, and what it means."""
     lines: list[str] = []
     meanings = _meanings(type(config))
     for one in fields(config):
@@ -29,7 +28,7 @@ def settings_of(config: Any, prefix: str = "") -> list[str]:
             lines += ["", f"# {name}: {_first_line(type(value))}", *settings_of(value, f"{name}.")]
         else:
             meaning = meanings.get(one.name, "")
-            lines.append(f"{name} = {short(value)}" + (f"  # {meaning}" if meaning else ""))
+            lines.append(f"{name} = {_written(value)}" + (f"  # {meaning}" if meaning else ""))
     return lines
 
 
@@ -52,6 +51,11 @@ def _meanings(kind: type) -> dict[str, str]:
         if is_dataclass(one):
             found |= {name: comment for name, comment in _FIELD.findall(inspect.getsource(one)) if comment}
     return found
+
+
+def _written(value: Any) -> str:
+    """A value as the command line and files take it: JSON, which is YAML, too."""
+    return json.dumps(value, default=asdict)
 
 
 def _first_line(kind: type) -> str:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from agents.base import Agent, Decision
 from agents.budget import Meter
 from agents.solution import Track
+from autopoly_env.arguments import above, at_least
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import canonical_hash
 from autopoly_env.operators import STOP
@@ -22,8 +23,8 @@ class BeamConfig:
     merge_grid: float = 1 / 128  # shapes that agree to this length (unit square) count as one
 
     def __post_init__(self) -> None:
-        if self.width < 1 or self.patience < 1 or not self.merge_grid > 0.0:
-            raise ConfigError(f"{self}: expected a width and a patience of at least 1 and a positive merge_grid")
+        at_least(1, width=self.width, patience=self.patience)
+        above(0, merge_grid=self.merge_grid)
         if not 0.0 <= self.stuck_discount <= 1.0:
             raise ConfigError(f"stuck_discount = {self.stuck_discount}: expected a share, 0 to 1")
 

@@ -49,7 +49,7 @@ class Retargeted:
     n_dropped: int
     n_added: int
     before: Score  # of the given last mesh, as it is, on the new target
-    refitted: Score  # of the same steps, none lost or added, laid over the new target and refitted
+    refitted: Score  # of the same steps, none lost or added, laid over the new target and refitted: what it began with
     aligned: PolyMesh  # which that is the score of
     start_iou: float  # of the start mesh on the new target
     least_start_iou: float  # below which it begins elsewhere than the given one did
@@ -78,26 +78,29 @@ def retarget(
     """
     meter = Meter(budget, on_progress)
     beginnings = align(simulator, sequence, meter)
-    aligned, least = beginnings[0], START_SHARE * sequence.start_score["iou"]
+    least = START_SHARE * sequence.start_score["iou"]
 
     def worth(one: Version) -> float:
         return one.total - _WORTH * (_start_iou(simulator, one) < least)
 
     beginnings.sort(key=worth, reverse=True)
-    version = beginnings[0]
+    version = aligned = beginnings[0]
     try:
         for beginning in beginnings:
             for better in improve(simulator, beginning, meter):
-                version = max(version, better, key=worth)
+                if worth(better) > worth(version):
+                    version, aligned = better, beginning
     except KeyboardInterrupt:
         meter.stopped_by = "interrupted"
+    before, refitted = simulator.final_score(sequence.final()), simulator.final_score(aligned.mesh)
     levelled = _levelled(simulator, version) if keep_level else None
-    version = levelled or version
-    is_levelled = levelled is not None
-    solution = finish(simulator, version.states(simulator), meter, keep_steps=True, keep_shape=is_levelled)
+    if levelled is not None:
+        states = levelled.states(simulator)
+        version, solution = levelled, finish(simulator, states, meter, keep_steps=True, keep_shape=True)
+    else:
+        version, solution = _finished(simulator, version, aligned, refitted, meter)
     n_steps = len(solution.sequence.steps)
     n_kept = sum(origin is not None for origin in version.origins[:n_steps])
-    before, refitted = simulator.final_score(sequence.final()), simulator.final_score(aligned.mesh)
     n_dropped = len(sequence.steps) - n_kept
     start_iou = solution.sequence.start_score["iou"]
     offs = _off_line(version, solution.mesh)
@@ -115,6 +118,16 @@ def retarget(
         n_level,
         len(offs) - n_level,
     )
+
+
+def _finished(
+    simulator: Simulator, version: Version, aligned: Version, refitted: Score, meter: Meter
+) -> tuple[Version, Solution]:
+    """The version, finished; or what it began with, where that is better at the image's own resolution."""
+    found = [(version, finish(simulator, version.states(simulator), meter, keep_steps=True))]
+    if found[0][1].score.total < refitted.total:
+        found.append((aligned, finish(simulator, aligned.states(simulator), meter, keep_steps=True)))
+    return max(found, key=lambda pair: simulator.worth(pair[1].mesh))
 
 
 def _levelled(simulator: Simulator, version: Version) -> Version | None:

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from agents.search.config import MctsConfig
+from autopoly_env.arguments import at_least
 from autopoly_env.errors import ConfigError
 from autopoly_env.operators import preset
+from autopoly_env.shown import short
 from autopoly_env.targets import ConstructionTargets, TargetSource, make_targets
 
 # What policies are trained with by default: frozen, so that weights and observations stay what they are.
@@ -34,8 +36,9 @@ class NetConfig:
     n_rounds: int = 2  # of messages between neighbouring half-edges
 
     def __post_init__(self) -> None:
-        if min(*self.widths, self.width) < 4 or not 0 <= self.n_rounds <= 8:
-            raise ConfigError(f"{self}: expected widths of at least 4 and 0 to 8 rounds")
+        at_least(4, widths=min(self.widths), width=self.width)
+        if not 0 <= self.n_rounds <= 8:
+            raise ConfigError(f"n_rounds={short(self.n_rounds)}: expected 0 to 8")
 
 
 @dataclass(frozen=True)
@@ -49,8 +52,8 @@ class SpaceSpec:
 
     def __post_init__(self) -> None:
         preset(self.operators)
-        if self.max_vertices < 4 or self.max_steps < 1:
-            raise ConfigError(f"{self}: expected max_vertices of at least 4 and max_steps of at least 1")
+        at_least(4, max_vertices=self.max_vertices)
+        at_least(1, max_steps=self.max_steps)
         if self.obs_resolution % 16 or not 16 <= self.obs_resolution <= 256:
             raise ConfigError(
                 f"obs_resolution {self.obs_resolution}: expected a multiple of 16, 16 to 256 pixels a side"
@@ -114,8 +117,8 @@ class RlConfig:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if self.k < 1 or self.seed < 0:
-            raise ConfigError(f"{self}: expected k of at least 1 and a seed of at least 0")
+        at_least(1, k=self.k)
+        at_least(0, seed=self.seed)
         if not 0.0 < self.temperature < math.inf:
             raise ConfigError(f"temperature = {self.temperature}: expected a finite number above 0")
 

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,9 @@ from PIL import Image
 
 from agents.budget import Budget, Meter, Progress
 from agents.retarget import _words, main
+from agents.retell import retargeting
 from agents.retell.retargeting import align, retarget
+from agents.retell.versions import Version
 from autopoly_env.mesh import PolyMesh, is_sane
 from autopoly_env.mesh.symmetry import axis_of
 from autopoly_env.operators import OPERATORS, Action
@@ -69,6 +72,26 @@ def test_the_same_shape__is_met_exactly_with_all_steps_kept(target: Silhouette) 
     assert done.solution.score.iou > 0.99
     assert [step.operator for step in done.solution.sequence.steps] == ["edge_subdivide"] * 2
     assert done.before.total < done.solution.score.total
+
+
+def test_result__is_no_worse_than_the_steps_refitted(monkeypatch: pytest.MonkeyPatch) -> None:
+    def worse(_simulator: Simulator, version: Version, _meter: Meter) -> Iterator[Version]:
+        """Better where it is searched, but not at the image's own resolution."""
+        small = 0.5 + 0.2 * (version.mesh.vertices - 0.5)
+        yield replace(version, mesh=version.mesh.with_vertices(small), score=replace(version.score, total=1000.0))
+
+    monkeypatch.setattr(retargeting, "improve", worse)
+    monkeypatch.setattr(Simulator, "polish", lambda _simulator, mesh: mesh)
+    done = retarget(Simulator(TALL), ell(), Budget(refits=60))
+    assert done.solution.score.total >= done.refitted.total > 50.0
+
+
+def test_result_that_is_less__says_what_for() -> None:
+    done = retarget(Simulator(TALL), ell(), Budget(refits=60))
+    less = replace(done, refitted=replace(done.refitted, total=99.0))
+    assert _words(done, 2).endswith(" now")
+    assert _words(less, 2).endswith(" now, without hairlines")
+    assert " now, level and plumb\n" in _words(less, 2, keep_level=True)
 
 
 def test_start_on_a_detail__is_called_what_it_is() -> None:

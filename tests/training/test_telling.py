@@ -1,8 +1,12 @@
 """What trainings say: signs of life, settings with what they mean, metrics beside what they are measured against."""
 
+import re
+
 import pytest
 
+from autopoly_env.errors import ConfigError
 from training.networks.labelling import SourceConfig
+from training.options import read_config
 from training.policies.clone_samples import CloneConfig
 from training.policies.config import TrainRlConfig
 from training.policies.run_state import RunState
@@ -17,7 +21,26 @@ def test_settings__are_all_listed_and_can_be_given_as_they_are_named(kind: type)
     lines = [line for line in settings_of(kind()) if line and not line.startswith("#")]
     names = [line.partition(" = ")[0] for line in lines]
     assert len(names) == len(set(names)) > 3 and all(" = " in line for line in lines)
-    assert all("\n" not in line for line in lines)
+    given = [line.partition("  # ")[0].replace(" = ", "=", 1) for line in lines]
+    assert read_config(None, given, kind()) == kind()  # none is cut
+
+
+@pytest.mark.parametrize("kind", [TrainRlConfig, CloneConfig, TrainNfapConfig, TrainWarpnetConfig, SourceConfig])
+def test_setting__that_is_no_finite_number_is_told_alone(kind: type) -> None:
+    lines = [line for line in settings_of(kind()) if re.match(r"[\w.]+ = [-\de.]+(?:  #|$)", line)]
+    for name, key in ((line.partition(" = ")[0], line.partition(" = ")[0].rpartition(".")[2]) for line in lines):
+        with pytest.raises(ConfigError, match=rf"\b{key}\b.*\bnan$|\b{key} ?=? ?nan: expected ") as caught:
+            read_config(None, [f"{name}=.nan"], kind())
+        assert len(str(caught.value)) < 150, name
+
+
+def test_training__ends_with_a_whole_rollout() -> None:
+    config = read_config(None, ["run.total_steps=1"], TrainRlConfig())
+    assert config.rollout == 32 * 64
+    assert [config.last_step(done) for done in (0, 1, 900)] == [2048, 1, 900]
+    config = read_config(None, ["run.total_steps=4096", "run.n_envs=2", "algorithm=dqn"], TrainRlConfig())
+    assert config.rollout == 2 * 4
+    assert [config.last_step(done) for done in (0, 4095)] == [4096, 4103]
 
 
 def test_settings__say_what_they_mean() -> None:

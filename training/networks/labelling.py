@@ -17,6 +17,7 @@ import numpy as np
 from agents.budget import Budget
 from agents.registry import make_agent
 from agents.search.evaluator import ResidualEvaluator
+from autopoly_env.arguments import above, at_least
 from autopoly_env.arrays import Float32Array, FloatArray
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh, is_sane
@@ -56,14 +57,11 @@ class SourceConfig:
     def __post_init__(self) -> None:
         if not 64 <= self.resolution <= 512:
             raise ConfigError(f"resolution {self.resolution}: expected 64 to 512 pixels a side")
-        if min(self.n_steps, self.n_traced, self.refits) < 1 or min(self.n_random, self.seed) < 0:
-            raise ConfigError(
-                f"{self}: expected n_steps, n_traced and refits of at least 1, n_random and seed of at least 0"
-            )
+        at_least(1, n_steps=self.n_steps, n_traced=self.n_traced, refits=self.refits)
+        at_least(0, n_random=self.n_random, seed=self.seed)
         if not 0.0 <= self.traced <= 1.0:
             raise ConfigError(f"traced = {self.traced}: expected a share, 0 to 1")
-        if not self.play_temperature > 0.0:
-            raise ConfigError(f"play_temperature = {self.play_temperature}: expected a number above 0")
+        above(0, play_temperature=self.play_temperature)
 
 
 def build_trajectory(config: SourceConfig, number: int, held_out: bool = False) -> Trajectory:

@@ -12,6 +12,7 @@ from agents.guided.config import STOP_CLASS, UNKNOWN, NfapConfig, WarpConfig, cl
 from agents.guided.measures import candidate_arrays
 from agents.guided.pictures import draw_inputs, rendering
 from agents.guided.regions import region_image
+from autopoly_env.arguments import above, at_least
 from autopoly_env.arrays import AnyArray, Float32Array, FloatArray
 from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.mesh import PolyMesh
@@ -33,8 +34,8 @@ class LabelConfig:
     w_si: float = 5.0
 
     def __post_init__(self) -> None:
-        if not self.temperature > 0.0 or min(self.w_sm, self.w_sc, self.w_si) < 0.0:
-            raise ConfigError(f"{self}: expected a temperature above 0 and weights of at least 0")
+        above(0, temperature=self.temperature)
+        at_least(0, w_sm=self.w_sm, w_sc=self.w_sc, w_si=self.w_si)
 
     def gains(self, state: Labelled) -> FloatArray:
         """(A,) what each action adds to r_all; -infinity where it is not known."""

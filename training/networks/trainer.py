@@ -20,6 +20,7 @@ from torch import Tensor, nn
 from torch.nn.parallel import DistributedDataParallel
 
 from agents.commands.pulse import Pulse
+from autopoly_env.arguments import above, at_least
 from autopoly_env.arrays import ByteArray
 from autopoly_env.errors import ConfigError, RunError
 from autopoly_env.files import write_atomically
@@ -43,10 +44,9 @@ class OptimConfig:
     clip: float = 1.0  # largest norm of the gradient
 
     def __post_init__(self) -> None:
-        if not (self.lr > 0.0 and self.clip > 0.0 and self.weight_decay >= 0.0):
-            raise ConfigError(f"{self}: expected lr and clip above 0 and a weight_decay of at least 0")
-        if self.n_steps < 1 or self.batch_size < 1 or self.warmup < 0:
-            raise ConfigError(f"{self}: expected n_steps and batch_size of at least 1 and a warmup of at least 0")
+        above(0, lr=self.lr, clip=self.clip)
+        at_least(0, weight_decay=self.weight_decay, warmup=self.warmup)
+        at_least(1, n_steps=self.n_steps, batch_size=self.batch_size)
 
     def lr_at(self, step: int) -> float:
         """The learning rate of a step, 0 <= step < n_steps."""
@@ -71,10 +71,9 @@ class RunConfig:
     patience: int = 12  # measurements in a row that may fail to lower the held-out loss
 
     def __post_init__(self) -> None:
-        if min(self.log_every, self.eval_every, self.save_every, self.patience) < 1:
-            raise ConfigError(f"{self}: expected log_every, eval_every, save_every and patience of at least 1")
-        if min(self.seed, self.n_workers, self.n_threads) < 0:
-            raise ConfigError(f"{self}: expected a seed, n_workers and n_threads of at least 0")
+        at_least(1, log_every=self.log_every, eval_every=self.eval_every)
+        at_least(1, save_every=self.save_every, patience=self.patience)
+        at_least(0, seed=self.seed, n_workers=self.n_workers, n_threads=self.n_threads)
 
     def half_precision(self, device: torch.device) -> torch.autocast:
         """The context in which networks compute, in bfloat16 where it is wanted."""

@@ -11,6 +11,7 @@ from torch.utils.data import Dataset
 from agents.rl.config import NetConfig, SpaceSpec
 from agents.rl.network import observer_of
 from agents.rl.player import observation_of
+from autopoly_env.arguments import above, at_least
 from autopoly_env.arrays import BoolArray, Float32Array, IntArray
 from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.observation import PADDING, Observation
@@ -35,8 +36,8 @@ class CloneData:
     temperature: float = 0.5  # r_all points: of the softmax over what actions gain
 
     def __post_init__(self) -> None:
-        if self.n_held_out < 1 or not self.temperature > 0.0:
-            raise ConfigError(f"{self}: expected at least 1 held-out sample and a temperature above 0")
+        at_least(1, n_held_out=self.n_held_out)
+        above(0, temperature=self.temperature)
 
 
 @dataclass(frozen=True)

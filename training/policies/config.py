@@ -5,8 +5,10 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from agents.rl.config import NetConfig, SpaceSpec, TaskSpec
+from autopoly_env.arguments import above, at_least
 from autopoly_env.errors import ConfigError
 from autopoly_env.operators import preset
+from autopoly_env.shown import short
 
 HARMLESS = (  # a run may go on with other ones
     "total_steps",
@@ -35,12 +37,11 @@ class EnvConfig:
     n_plays: int = 4  # episodes with a target before the next one comes, which takes longer than a step
 
     def __post_init__(self) -> None:
-        if self.n_plays < 1:
-            raise ConfigError(f"n_plays {self.n_plays}: expected at least 1")
+        at_least(1, n_plays=self.n_plays)
         if not self.courses:
             raise ConfigError("courses: expected at least one task")
-        if not (self.reward_scale > 0.0 and self.illegal_penalty >= 0.0):
-            raise ConfigError(f"{self}: expected a reward_scale above 0 and a penalty of at least 0")
+        above(0, reward_scale=self.reward_scale)
+        at_least(0, illegal_penalty=self.illegal_penalty)
         self.spec()
 
     def spec(self) -> SpaceSpec:
@@ -58,8 +59,11 @@ class LearningRateConfig:
     warmup: float = 0.02  # share of the training
 
     def __post_init__(self) -> None:
-        if not (self.lr > 0.0 and 0.0 <= self.last <= 1.0 and 0.0 <= self.warmup < 1.0):
-            raise ConfigError(f"{self}: expected an lr above 0, last in 0..1 and a warmup in 0..1")
+        above(0, lr=self.lr)
+        if not 0.0 <= self.last <= 1.0:
+            raise ConfigError(f"last={short(self.last)}: expected a share, 0 to 1")
+        if not 0.0 <= self.warmup < 1.0:
+            raise ConfigError(f"warmup={short(self.warmup)}: expected a share from 0, below 1")
 
     def lr_at(self, done: float) -> float:
         """The learning rate when this share of the training, 0 to 1, is done."""
@@ -151,10 +155,9 @@ class RlRunConfig:
     save_every: int = 20_000  # steps
 
     def __post_init__(self) -> None:
-        if min(self.total_steps, self.n_envs, self.eval_every, self.n_eval, self.save_every) < 1:
-            raise ConfigError(f"{self}: expected steps, environments and targets of at least 1")
-        if min(self.seed, self.n_threads) < 0 or not 0.0 <= self.minutes < math.inf:
-            raise ConfigError(f"{self}: expected a seed, n_threads and minutes of at least 0")
+        at_least(1, total_steps=self.total_steps, n_envs=self.n_envs, n_eval=self.n_eval)
+        at_least(1, eval_every=self.eval_every, save_every=self.save_every)
+        at_least(0, seed=self.seed, n_threads=self.n_threads, minutes=self.minutes)
 
 
 @dataclass(frozen=True)
@@ -177,11 +180,20 @@ class TrainRlConfig:
             return self.a2c
         return self.dqn if self.algorithm == "dqn" else self.ppo
 
+    @property
+    def rollout(self) -> int:
+        """Steps of all environments together from update to update; a training plays whole rollouts."""
+        options = self.options()
+        return self.run.n_envs * (options.train_freq if isinstance(options, DqnOptions) else options.n_steps)
+
+    def last_step(self, done: int) -> int:
+        """The step that a training which stands at `done` ends with: `total_steps`, up to a whole rollout."""
+        return done + math.ceil(max(0, self.run.total_steps - done) / self.rollout) * self.rollout
+
 
 def _check(options: Any, **least: int) -> None:
     """Raise ConfigError for what is out of range in the arguments of an algorithm."""
     for name, bound in {**least, "max_grad_norm": 0, "ent_coef": 0, "vf_coef": 0}.items():
-        if not getattr(options, name, bound) >= bound:
-            raise ConfigError(f"{name} = {getattr(options, name)}: expected at least {bound}")
+        at_least(bound, **{name: getattr(options, name, bound)})
     if not 0.0 <= options.gamma <= 1.0:
         raise ConfigError(f"gamma = {options.gamma}: expected a discount, 0 to 1")

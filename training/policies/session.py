@@ -119,12 +119,14 @@ class Session(BaseCallback):
     def __init__(self, config: TrainRlConfig, folder: Path, state: RunState, lr: LearningRate) -> None:
         super().__init__()
         self.config, self.state, self.lr = config, state, lr
+        self.last_step = config.last_step(state.step)
         self.log = TrainingLog(folder, state)
         self.curriculum = Curriculum(config)
         self.best = BestPolicy(config, folder, state)
         self.checkpoints = Checkpoints(config, folder, state)
         self.bar: Progress | None = None  # of steps
         self.is_timed = False  # whether the clock is running, and not an exam or saving
+        self._is_updating = False
         self._exam_seconds = self._update_seconds = 0.0  # that the last ones took
         self._begun_at = (state.step, state.seconds)
         self._told = -math.inf  # when there was a line of an update
@@ -153,8 +155,8 @@ class Session(BaseCallback):
         """Where the training stands, in a few words."""
         state = self.state
         spent = self._spent()
-        what = "" if self.is_timed else ", exam or saving"
-        return f"step {max(state.step, self.num_timesteps)} of {self.config.run.total_steps}, {duration(spent)}{what}"
+        what = (", updating the policy" if self._is_updating else "") if self.is_timed else ", exam or saving"
+        return f"step {max(state.step, self.num_timesteps)} of {self.last_step}, {duration(spent)}{what}"
 
     def _on_training_start(self) -> None:
         if self.config.run.init and not math.isfinite(self.state.best):
@@ -165,7 +167,7 @@ class Session(BaseCallback):
     def _on_rollout_start(self) -> None:
         """After an update, or at the very beginning."""
         state = self.state
-        self.is_timed = False
+        self.is_timed = self._is_updating = False
         self._update_seconds = self.log.clock.stop_update()
         state.seconds += self._update_seconds
         state.step, state.n_updates = self.num_timesteps, int(getattr(self.model, "_n_updates", 0))
@@ -199,7 +201,7 @@ class Session(BaseCallback):
         return not self.is_over
 
     def _on_rollout_end(self) -> None:
-        n_steps = self.num_timesteps - self.state.step
+        n_steps, self._is_updating = self.num_timesteps - self.state.step, True
         self.state.seconds += self.log.clock.stop_rollout(self._env_seconds(), n_steps)
         self._check()
 

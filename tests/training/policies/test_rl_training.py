@@ -244,7 +244,7 @@ def test_command__trains_and_exports(
     [
         (["algorithm=sarsa"], "algorithm"),
         (["ppo.n_stepz=3"], "unknown option 'n_stepz'"),
-        (["ppo.batch_size=0"], "batch_size = 0: expected at least 2"),
+        (["ppo.batch_size=0"], "batch_size=0: expected a number of at least 2"),
         (["run.n_envs=1"], "1 environments for 2 tasks"),
         (["env.operators=melt"], "operators 'melt' are unknown"),
         (["env.courses=[{targets: nowhere}]"], "nowhere"),
