@@ -63,7 +63,7 @@ def test_make_agent__of_a_file_is_the_agent_with_these_options(tmp_path: Path) -
         ("witdh: 3", r"unknown option 'witdh'; the options of beam are width, patience, stuck_discount, merge_grid$"),
         ("3: 3", "unknown option 3; the options of beam are width"),
         ("width: wide", "option width: .* got 'wide'"),
-        ("width: 0", "a width and a patience of at least 1"),
+        ("width: 0", "width=0: expected a number of at least 1"),
         ("width: [1", "not YAML .* write one 'option: value' a line"),
         ("width: !!python/object:os.system 1", "not YAML"),
         ("a: &a [*a]\n\tb", "not YAML"),

@@ -135,9 +135,9 @@ def test_act__is_the_first_step_to_the_best() -> None:
     ("options", "complaint"),
     [
         ({"width": 0}, "width = 0, which leaves nothing out: expected a depth"),
-        ({"width": -1}, "expected a width"),
+        ({"width": -1}, "width=-1: expected a number of at least 1"),
         ({"depth": 0}, "depth = 0: expected at least 1"),
-        ({"merge_grid": 0.0}, "positive merge_grid"),
+        ({"merge_grid": 0.0}, "merge_grid=0.0: expected a number above 0"),
     ],
 )
 def test_config__says_what_is_wrong(options: dict[str, Any], complaint: str) -> None:
