@@ -34,6 +34,8 @@ def small_jobs(folder: Path, earlier: Path | None = None) -> Iterator[SmallJob]:
     yield job("autopoly_env.warm", compiles=True)
     yield job("agents.solve", mug, chair, "--out", folder / "solved")
     yield job("agents.solve", EXAMPLES, "--seconds", 12, "--out", folder / "long", name="agents.solve --seconds 12")
+    networks = (mug, "--agent", "nfap-mcts", "--refits", 16, "--out", folder / "networks")
+    yield job("agents.solve", *networks, name="agents.solve --agent nfap-mcts")
     yield job("agents.vary", sequence, "--n", 40, "--out", folder / "varied")
     yield job("agents.retarget", sequence, EXAMPLES / "teapot.png", "--refits", 600, "--out", folder / "told")
     yield job("agents.export", sequence, "--to", "gif", "--out", folder / "mug.gif")
