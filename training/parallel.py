@@ -207,7 +207,7 @@ class _Worker:
         self._process = context.Process(target=_work, args=(end, function), daemon=True)
         # The first start of a process starts Python's resource tracker, and that lets interrupts through again.
         multiprocessing.resource_tracker.ensure_running()
-        with _environment(ONE_THREAD), _no_interrupts():
+        with _environment(ONE_THREAD), no_interrupts():
             self._process.start()
         end.close()
 
@@ -271,7 +271,7 @@ def _environment(variables: dict[str, str]) -> Iterator[None]:
 
 
 @contextmanager
-def _no_interrupts() -> Iterator[None]:
+def no_interrupts() -> Iterator[None]:
     """Ctrl-C goes to all processes of a terminal: those that are started within never hear of it, their parent does,
     once they have been started: half a start would be a worker that complains of a torn pipe.
     """

@@ -254,19 +254,29 @@ def test_ctrl_c__while_a_worker_starts_waits_until_it_has_started(monkeypatch: p
     assert wait_until(lambda: not started[0].is_alive())
 
 
+_STARTS_A_WORKER = {
+    "of an evaluation": "from training.parallel import _Worker\nworker = _Worker(do)\npid = worker._process.pid\n",
+    "that makes samples": (
+        "from training.networks.streams import batches\nmade = batches([{}], 1, 1)\npid = made._workers[0].pid\n"
+    ),
+}
+
+
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="the masks of processes are read from /proc")
-def test_worker__is_deaf_to_ctrl_c_from_its_first_moment() -> None:
+@pytest.mark.parametrize("start", _STARTS_A_WORKER.values(), ids=_STARTS_A_WORKER)
+def test_worker__is_deaf_to_ctrl_c_from_its_first_moment(start: str) -> None:
     # In a process of its own: Python starts more than the worker where it is the first one.
     script = (
+        "import os, signal\n"
         "from pathlib import Path\n"
         "from tests.helpers.odd_jobs import do\n"
-        "from training.parallel import _Worker\n"
         "if __name__ == '__main__':\n"
-        "    worker = _Worker(do)\n"
-        "    status = Path(f'/proc/{worker._process.pid}/status').read_text()\n"
-        "    print(next(line for line in status.splitlines() if line.startswith('SigBlk')).split()[1])\n"
-        "    worker.stop()\n"
+        f"    {start.replace(chr(10), chr(10) + '    ')}\n"
+        "    status = Path(f'/proc/{pid}/status').read_text()\n"
+        "    print(next(line for line in status.splitlines() if line.startswith('SigBlk')).split()[1], flush=True)\n"
+        "    os.kill(pid, signal.SIGKILL)\n"
+        "    os._exit(0)\n"
     )
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=ROOT)
-    assert run.stderr == ""
+    assert "Traceback" not in run.stderr
     assert int(run.stdout, 16) >> signal.SIGINT - 1 & 1

@@ -21,6 +21,7 @@ from autopoly_env.errors import ConfigError
 from training.networks.labelling import SourceConfig, build_trajectory
 from training.networks.samples import LabelConfig, Sample, nfap_sample, turned, warp_sample
 from training.networks.trajectories import Shard, Trajectory
+from training.parallel import no_interrupts
 
 Batch = dict[str, Tensor]
 _HELD_OUT_BATCH = 64
@@ -196,7 +197,8 @@ def batches(
         worker_init_fn=_one_thread,
         prefetch_factor=4 if n_workers else None,
     )
-    return iter(loader)
+    with no_interrupts():  # workers, which import for seconds before they do anything, leave Ctrl-C to this process
+        return iter(loader)
 
 
 class HeldOut:
