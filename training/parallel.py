@@ -205,8 +205,6 @@ class _Worker:
         context = multiprocessing.get_context("spawn")
         self.pipe, end = context.Pipe()
         self._process = context.Process(target=_work, args=(end, function), daemon=True)
-        # The first start of a process starts Python's resource tracker, and that lets interrupts through again.
-        multiprocessing.resource_tracker.ensure_running()
         with _environment(ONE_THREAD), no_interrupts():
             self._process.start()
         end.close()
@@ -278,6 +276,8 @@ def no_interrupts() -> Iterator[None]:
     if not hasattr(signal, "pthread_sigmask"):  # on Windows
         yield
         return
+    # The first start of a process starts Python's resource tracker, and that would let interrupts through again.
+    multiprocessing.resource_tracker.ensure_running()
     came: list[int] = []
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     # The mask is of this thread alone: where another one takes the signal, Python calls the handler in this one still.
