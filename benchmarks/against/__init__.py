@@ -1,0 +1,1 @@
+"""Another revision of this repository beside this one, measured in turn: `python -m benchmarks.against REV`."""
