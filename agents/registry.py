@@ -1,49 +1,132 @@
 """Agents by name: `make_agent("beam", width=4)`; and those from outside: `make_agent("my.module:MyAgent")`."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
 from functools import partial
+from importlib import import_module
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from agents.base import Agent
-from agents.baselines.beam import BeamAgent, GreedyAgent
-from agents.baselines.fixed_topology import DrComplexConfig, DrSimpleConfig, dr_complex, dr_simple
-from agents.baselines.oracle import OracleAgent
-from agents.baselines.random_agent import RandomAgent
-from agents.climb.agent import ClimbAgent
-from agents.climb.decimate import DecimateAgent
 from agents.entry import AgentEntry, entry_of, outside_entry
-from agents.guided.agent import nfap_mcts, nfap_prior
-from agents.guided.config import NfapMctsConfig, NfapPriorConfig
-from agents.quads.agent import QuadsAgent
-from agents.rl.agent import PRIOR, rl_agent, rl_prior
-from agents.rl.config import RlConfig, RlPriorConfig
-from agents.search.config import PAPER, MctsConfig
-from agents.search.mcts import MctsAgent, PaperMctsAgent
-from agents.trace.agent import TraceAgent
 from autopoly_env.errors import ConfigError
 
 SUFFIXES = (".yaml", ".yml")  # of files of options
 
 
-def _mcts(config: MctsConfig) -> Agent:
-    return MctsAgent(config, [make_agent(name) for name in config.seeds])
+class _Entries(MutableMapping[str, AgentEntry]):
+    """Entries by name, each made when it is first asked for: the modules of most agents are not needed."""
+
+    def __init__(self, makers: Mapping[str, Callable[[], AgentEntry]]) -> None:
+        self._makers, self._made = dict(makers), dict[str, AgentEntry]()
+
+    def __getitem__(self, name: str) -> AgentEntry:
+        if name not in self._made:
+            self._made[name] = self._makers[name]()
+        return self._made[name]
+
+    def __setitem__(self, name: str, entry: AgentEntry) -> None:
+        self._makers[name], self._made[name] = lambda: entry, entry
+
+    def __delitem__(self, name: str) -> None:
+        del self._makers[name]
+        self._made.pop(name, None)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._makers)
+
+    def __len__(self) -> int:
+        return len(self._makers)
 
 
-def _mcts_paper(config: MctsConfig) -> Agent:
-    return PaperMctsAgent(config, [make_agent(name) for name in config.seeds])
+def _class(home: str, name: str) -> AgentEntry:
+    """The agent of a class in a module of this package, as my.module:Agent is one of another."""
+    module, _, class_name = home.partition(":")
+    return entry_of(getattr(import_module(f"agents.{module}"), class_name), name)
 
 
-def _nfap_prior(config: NfapPriorConfig) -> Agent:
-    return nfap_prior(config, [make_agent(name) for name in config.seeds])
+def _mcts() -> AgentEntry:
+    from agents.search.config import MctsConfig
+    from agents.search.mcts import MctsAgent
+
+    return AgentEntry("mcts", lambda config: MctsAgent(config, _seeds(config.seeds)), MctsConfig())
 
 
-def _rl_prior(config: RlPriorConfig) -> Agent:
-    options = {PRIOR: {"weights": config.weights}}
-    return rl_prior(config, [make_agent(name, **options.get(name, {})) for name in config.seeds])
+def _mcts_paper() -> AgentEntry:
+    from agents.search.config import PAPER
+    from agents.search.mcts import PaperMctsAgent
+
+    return AgentEntry("mcts_paper", lambda config: PaperMctsAgent(config, _seeds(config.seeds)), PAPER)
 
 
-AGENTS: dict[str, AgentEntry] = {}
+def _nfap_prior() -> AgentEntry:
+    from agents.guided.agent import nfap_prior
+    from agents.guided.config import NfapPriorConfig
+
+    return AgentEntry("nfap-prior", lambda config: nfap_prior(config, _seeds(config.seeds)), NfapPriorConfig())
+
+
+def _nfap_mcts() -> AgentEntry:
+    from agents.guided.agent import nfap_mcts
+    from agents.guided.config import NfapMctsConfig
+
+    return AgentEntry("nfap-mcts", nfap_mcts, NfapMctsConfig())
+
+
+def _policy(name: str) -> AgentEntry:
+    from agents.rl.agent import rl_agent
+    from agents.rl.config import RlConfig
+
+    return AgentEntry(name, partial(rl_agent, name), RlConfig())
+
+
+def _rl_prior() -> AgentEntry:
+    from agents.rl.agent import PRIOR, rl_prior
+    from agents.rl.config import RlPriorConfig
+
+    def made(config: RlPriorConfig) -> Agent:
+        return rl_prior(config, _seeds(config.seeds, {PRIOR: {"weights": config.weights}}))
+
+    return AgentEntry("rl-prior", made, RlPriorConfig())
+
+
+def _dr_simple() -> AgentEntry:
+    from agents.baselines.fixed_topology import DrSimpleConfig, dr_simple
+
+    return AgentEntry("dr-simple", dr_simple, DrSimpleConfig())
+
+
+def _dr_complex() -> AgentEntry:
+    from agents.baselines.fixed_topology import DrComplexConfig, dr_complex
+
+    return AgentEntry("dr-complex", dr_complex, DrComplexConfig())
+
+
+def _seeds(names: Sequence[str], options: Mapping[str, Mapping[str, Any]] = MappingProxyType({})) -> list[Agent]:
+    """The agents whose best a search goes on from."""
+    return [make_agent(name, **options.get(name, {})) for name in names]
+
+
+AGENTS: MutableMapping[str, AgentEntry] = _Entries(
+    {
+        "random": partial(_class, "baselines.random_agent:RandomAgent", "random"),
+        "greedy": partial(_class, "baselines.beam:GreedyAgent", "greedy"),
+        "beam": partial(_class, "baselines.beam:BeamAgent", "beam"),
+        "trace": partial(_class, "trace.agent:TraceAgent", "trace"),
+        "climb": partial(_class, "climb.agent:ClimbAgent", "climb"),
+        "decimate": partial(_class, "climb.decimate:DecimateAgent", "decimate"),
+        "quads": partial(_class, "quads.agent:QuadsAgent", "quads"),
+        "mcts": _mcts,
+        "mcts_paper": _mcts_paper,
+        "nfap-prior": _nfap_prior,
+        "nfap-mcts": _nfap_mcts,
+        **{name: partial(_policy, name) for name in ("ppo", "maskable-ppo", "a2c", "dqn")},
+        "rl-prior": _rl_prior,
+        "oracle": partial(_class, "baselines.oracle:OracleAgent", "oracle"),
+        "dr-simple": _dr_simple,
+        "dr-complex": _dr_complex,
+    }
+)
 
 
 def register_agent(name: str, made_by: Callable[..., Agent], default: Any = None) -> None:
@@ -80,22 +163,3 @@ def find_agent(agent: str | Callable[..., Agent]) -> AgentEntry:
 def make_agent(agent: str | Callable[..., Agent], /, **options: Any) -> Agent:
     """The agent that `find_agent` finds, with these options of its config. Raises ConfigError for an unknown one."""
     return find_agent(agent).agent(**options)
-
-
-register_agent("random", RandomAgent)
-register_agent("greedy", GreedyAgent)
-register_agent("beam", BeamAgent)
-register_agent("trace", TraceAgent)
-register_agent("climb", ClimbAgent)
-register_agent("decimate", DecimateAgent)
-register_agent("quads", QuadsAgent)
-register_agent("mcts", _mcts, MctsConfig())
-register_agent("mcts_paper", _mcts_paper, PAPER)
-register_agent("nfap-prior", _nfap_prior, NfapPriorConfig())
-register_agent("nfap-mcts", nfap_mcts, NfapMctsConfig())
-for _name in ("ppo", "maskable-ppo", "a2c", "dqn"):
-    register_agent(_name, partial(rl_agent, _name), RlConfig())
-register_agent("rl-prior", _rl_prior, RlPriorConfig())
-register_agent("oracle", OracleAgent)
-register_agent("dr-simple", dr_simple, DrSimpleConfig())
-register_agent("dr-complex", dr_complex, DrComplexConfig())

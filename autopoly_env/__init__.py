@@ -3,11 +3,13 @@
 The names in `__all__` are loaded when they are first asked for, so that importing stays light.
 """
 
+import sys as _sys
+from collections.abc import Sequence as _Sequence
 from importlib import import_module
+from importlib.machinery import ModuleSpec as _ModuleSpec
+from importlib.machinery import PathFinder as _PathFinder
+from types import ModuleType as _ModuleType
 from typing import TYPE_CHECKING, Any
-
-from gymnasium.envs.registration import register as _register
-from gymnasium.envs.registration import registry as _registry
 
 if TYPE_CHECKING:
     from autopoly_env.mesh import PolyMesh
@@ -74,10 +76,10 @@ def __dir__() -> list[str]:
     return sorted([*__all__, "__version__"])
 
 
-def _make_known() -> None:
+def _make_known(registration: _ModuleType) -> None:
     for name, settings in _ENVIRONMENTS.items():
-        if name not in _registry:
-            _register(
+        if name not in registration.registry:
+            registration.register(
                 name,
                 entry_point="autopoly_env.env:AutoPolyEnv",
                 vector_entry_point="autopoly_env.vector_env:AutoPolyVectorEnv",
@@ -86,4 +88,32 @@ def _make_known() -> None:
             )
 
 
-_make_known()
+class _OnArrival:
+    """A finder of modules that makes the environments known once Gymnasium is there, without importing it before.
+
+    Its import takes as long as that of NumPy, and who traces an image needs none of it.
+    """
+
+    def find_spec(
+        self, name: str, path: _Sequence[str] | None, target: _ModuleType | None = None
+    ) -> _ModuleSpec | None:
+        if name != _REGISTRATION:
+            return None
+        _sys.meta_path.remove(self)
+        spec = _PathFinder.find_spec(name, path, target)
+        if spec is not None and spec.loader is not None:
+            load = spec.loader.exec_module
+
+            def load_and_tell(module: _ModuleType) -> None:
+                load(module)
+                _make_known(module)
+
+            spec.loader.exec_module = load_and_tell  # type: ignore[method-assign]
+        return spec
+
+
+_REGISTRATION = "gymnasium.envs.registration"
+if _REGISTRATION in _sys.modules:
+    _make_known(_sys.modules[_REGISTRATION])
+else:
+    _sys.meta_path.insert(0, _OnArrival())

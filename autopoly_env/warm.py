@@ -40,7 +40,7 @@ with _leaving_at_ctrl_c(__name__ == "__main__"):
     import numpy as np
 
     from autopoly_env.compute import jit, n_threads
-    from autopoly_env.details import hairlines
+    from autopoly_env.details import Details, hairlines
     from autopoly_env.mesh import PolyMesh
     from autopoly_env.operators import OPERATORS, legal_actions
     from autopoly_env.placement import Disagreement, tried
@@ -162,6 +162,7 @@ def pictures() -> None:
     score(mesh, target, ScoreWeights())
     hairlines(mesh, target)
     tune(mesh, target)
+    Details.of(silhouette)
     coverage_vjp(batch_of([mesh]), np.ones((1, 32, 32)))
 
 

@@ -46,7 +46,8 @@ TABLES = {
         placement: where new vertices begin | refit: a mesh meets the target | score: r_all | observation: what is seen
         operators: an action becomes a mesh | raster: exact coverage, exact derivatives | viewer: pictures of meshes
         mesh: PolyMesh: vertices, faces, their topology
-        silhouette: an image becomes a mask | compute: kernels, threads | files | outside
+        silhouette: an image becomes a mask
+        compute: kernels, threads | files | outside
         arguments: values that people type
         errors
         shown: text in one tame line | arrays

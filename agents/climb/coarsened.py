@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 
 import numpy as np
-from skimage.morphology import isotropic_closing, isotropic_opening
 
-from autopoly_env.silhouette import Silhouette
+from autopoly_env.arrays import BoolArray
+from autopoly_env.silhouette import Silhouette, distances_within
 
 _RADII = (0.012, 0.025, 0.04, 0.06)  # unit square
 _RESOLUTION = 256  # pixels a side that are enough to see them by
@@ -20,10 +20,24 @@ def variants(silhouette: Silhouette, resolution: int = _RESOLUTION) -> Iterator[
     mask = silhouette.target(size).mask
     margin = int(np.ceil(_RADII[-1] * size)) + 1  # so that the border of the picture is no border of the shape
     padded = np.pad(mask, margin)
-    for change in (isotropic_opening, isotropic_closing):
+    for change in (_opened, _closed):
         last = mask
         for radius in _RADII:
             changed = change(padded, radius * size)[margin:-margin, margin:-margin]
             if changed.any() and not np.array_equal(changed, last):
                 yield Silhouette(changed, silhouette.name)
             last = changed
+
+
+def _opened(mask: BoolArray, radius: float) -> BoolArray:
+    """What of a mask (H, W) discs of a radius in pixels cover that lie within it."""
+    eroded = distances_within(mask) > radius
+    opened: BoolArray = distances_within(~eroded) <= radius
+    return opened
+
+
+def _closed(mask: BoolArray, radius: float) -> BoolArray:
+    """The mask (H, W) and all that no disc within its background covers."""
+    dilated = distances_within(~mask) <= radius
+    closed: BoolArray = distances_within(dilated) > radius
+    return closed

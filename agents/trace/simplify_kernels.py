@@ -19,13 +19,21 @@ def thin(points: FloatArray, n_keep: int) -> IntArray:
     for i in range(n):
         area[i] = _triangle(points, before[i], i, after[i])
     for _ in range(n - n_keep):
-        least = int(np.argmin(area))
+        least = 0
+        for i in range(1, n):
+            if area[i] < area[least]:
+                least = i
         area[least] = np.inf
         i, j = before[least], after[least]
         after[i], before[j] = j, i
         area[i] = max(_triangle(points, before[i], i, j), 0.0)
         area[j] = max(_triangle(points, i, j, after[j]), 0.0)
-    return np.flatnonzero(area < np.inf)
+    left, n_left = np.empty(n, np.int64), 0
+    for i in range(n):
+        if area[i] < np.inf:
+            left[n_left] = i
+            n_left += 1
+    return left[:n_left].copy()
 
 
 @kernel

@@ -23,6 +23,7 @@ with warnings.catch_warnings(record=True) as _said:  # of its variables; a warni
     from numba import njit, types
     from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
     from numba.core.registry import cpu_target
+    from numba.core.runtime import rtsys
 for _one in _said:
     print("autopoly_env:", str(_one.message).partition("\n")[0], file=sys.stderr)
 
@@ -144,8 +145,11 @@ class _KernelCache(FunctionCache):
         return found
 
     def _loaded(self, sig: Any, target_context: Any) -> Any:
+        """What is compiled already. Numba would first load all that it knows of compiling, which takes longer."""
         with contextlib.suppress(OSError):
-            return super().load_overload(sig, target_context)
+            rtsys.initialize(target_context)  # machine code that allocates calls it
+            with self._guard_against_spurious_io_errors():
+                return self._load_overload(sig, target_context)
         return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
@@ -160,6 +164,23 @@ class _NoCache(NullCache):
         _announce_compilation()
 
 
+class _Unopened:
+    """A kernel's cache that is opened at its first call: of the kernels that a process imports it calls a few."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
+
+    @functools.cached_property
+    def _opened(self) -> Any:
+        try:
+            return _KernelCache(self._function)
+        except (RuntimeError, OSError):
+            return _NoCache()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._opened, name)
+
+
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile `function` to machine code that runs without the GIL, IEEE division included, cached on disk."""
     inner = function.__name__.startswith("_")
@@ -168,8 +189,5 @@ def kernel(function: Callable[..., Any]) -> Any:
     compiled.get_call_template = lambda args, kws: template_of(
         tuple(map(types.unliteral, args)), {name: types.unliteral(kind) for name, kind in kws.items()}
     )  # a call with a constant is no other call: Numba would compile the kernel once more for it
-    try:
-        compiled._cache = _KernelCache(function)
-    except (RuntimeError, OSError):
-        compiled._cache = _NoCache()
+    compiled._cache = _Unopened(function)
     return compiled

@@ -10,7 +10,7 @@ from autopoly_env.arrays import BoolArray, FloatArray, IntArray
 from autopoly_env.details.hairlines import FINEST
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.raster import coverage
-from autopoly_env.silhouette import Silhouette, label_holes, label_parts
+from autopoly_env.silhouette import Silhouette, areas, distances_within, label_holes, label_parts
 
 _SMALL = 2  # pixels at FINEST: a place is a detail if this much can be taken off all around it
 _LOW = 6  # pixels at FINEST: and it is deeper than this,
@@ -70,9 +70,7 @@ def _details_of(silhouette: Silhouette) -> Details:
 
 def _of_different_parts(points: FloatArray, mask: BoolArray) -> FloatArray:
     """Those (N, 2, 2) in parts of their own in the full picture: what joins them may be too thin at FINEST."""
-    from skimage.measure import label
-
-    labels, cell = label(mask, connectivity=2), -(-len(mask) // FINEST)
+    labels, cell = areas(mask, with_corners=True)[0], -(-len(mask) // FINEST)
     corners = np.maximum((points[:, 0] * len(mask)).astype(np.int64) - cell // 2, 0)
     names = [int(labels[y : y + cell, x : x + cell].max()) for x, y in corners.tolist()]
     return points[[k for k, name in enumerate(names) if not name or name not in names[:k]]]
@@ -90,9 +88,7 @@ def _points(labels: IntArray) -> FloatArray:
 
 
 def _deepest(labels: IntArray) -> FloatArray:
-    from scipy.ndimage import distance_transform_edt
-
-    depth = distance_transform_edt(np.pad(labels, 1) > 0)[1:-1, 1:-1]
+    depth = distances_within(np.pad(labels, 1) > 0)[1:-1, 1:-1]
     order = np.lexsort((-depth.ravel(), labels.ravel()))
     names = labels.ravel()[order]
     rows, columns = np.divmod(order[np.flatnonzero(np.diff(names, prepend=0))], len(labels))
@@ -179,9 +175,4 @@ def _stands_out(depth: FloatArray, n_off: int, least: int) -> bool:
 
 def _distance_to(mask: BoolArray) -> FloatArray:
     """How far every pixel is from the nearest of a mask, in pixels; infinitely where that is empty."""
-    from scipy.ndimage import distance_transform_edt
-
-    if not mask.any():
-        return np.full(mask.shape, np.inf)
-    distances: FloatArray = distance_transform_edt(~mask)
-    return distances
+    return distances_within(~mask)

@@ -120,7 +120,10 @@ def is_free_diagonal(ring: FloatArray, face: IntArray, edges: IntArray, i: int, 
     if arc_area(ring, i, j) <= 0.0 or arc_area(ring, j, i) <= 0.0:
         return False
     low, high = min(face[i], face[j]), max(face[i], face[j])
-    return not ((edges[:, 0] == low) & (edges[:, 1] == high)).any()
+    for e in range(len(edges)):
+        if edges[e, 0] == low and edges[e, 1] == high:
+            return False
+    return True
 
 
 @kernel

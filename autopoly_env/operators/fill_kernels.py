@@ -116,7 +116,7 @@ def _is_clear(vertices: FloatArray, edges: IntArray, face: IntArray, pairs: IntA
     """Whether no vertex lies in the convex face or on its rim, and no edge meets one of its new sides."""
     n = len(face)
     for p in range(len(vertices)):
-        if not (face == p).any() and _covers(vertices, face, p):
+        if not _has(face, p) and _covers(vertices, face, p):
             return False
     for k in range(n):
         v, w = face[k], face[(k + 1) % n]
@@ -130,6 +130,14 @@ def _is_clear(vertices: FloatArray, edges: IntArray, face: IntArray, pairs: IntA
             if segments_touch(vx, vy, wx, wy, vertices[p, 0], vertices[p, 1], vertices[q, 0], vertices[q, 1]):
                 return False
     return True
+
+
+@kernel
+def _has(face: IntArray, p: int) -> bool:
+    for k in range(len(face)):
+        if face[k] == p:
+            return True
+    return False
 
 
 @kernel

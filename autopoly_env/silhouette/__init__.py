@@ -1,6 +1,6 @@
 """Target pictures: found, read, told from their background, and averaged to any resolution."""
 
-from autopoly_env.silhouette.connectivity import LEVEL, label_holes, label_parts, torn_corners
+from autopoly_env.silhouette.connectivity import LEVEL, areas, distances_within, label_holes, label_parts, torn_corners
 from autopoly_env.silhouette.image_files import IMAGE_SUFFIXES, find_images
 from autopoly_env.silhouette.loading import ROUNDING, ImageSource, read_picture
 from autopoly_env.silhouette.options import DEFAULT_OPTIONS, ObjectOptions
@@ -19,6 +19,8 @@ __all__ = [
     "Silhouette",
     "Target",
     "area_means",
+    "areas",
+    "distances_within",
     "find_images",
     "label_holes",
     "label_parts",

@@ -6,6 +6,7 @@ import numpy as np
 
 from autopoly_env.arrays import BoolArray, Float32Array
 from autopoly_env.errors import SilhouetteError
+from autopoly_env.silhouette.connectivity import grown, shrunk
 from autopoly_env.silhouette.loading import Picture
 from autopoly_env.silhouette.options import ObjectOptions
 
@@ -68,10 +69,7 @@ def _without_shadow(grey: Float32Array, relative: Float32Array, opaque: BoolArra
     half = (relative > FAINT) & (relative < SOLID)
     if half.sum() < WIDE_SHARE * opaque.sum():
         return opaque, []
-    from scipy.ndimage import binary_dilation, binary_erosion
-
-    eight = np.ones((3, 3), dtype=bool)
-    wide = binary_erosion(half, eight)
+    wide = shrunk(half)
     n_wide, n_opaque = int(wide.sum()), int(opaque.sum())
     solid = relative >= SOLID
     if n_wide < WIDE_SHARE * n_opaque or not solid.any():
@@ -81,7 +79,7 @@ def _without_shadow(grey: Float32Array, relative: Float32Array, opaque: BoolArra
     if shade < SHADOW_DARK and shade < own - SHADOW_DARKER and solid.sum() > 0.2 * n_opaque:
         if not of_object:
             return opaque, ["a faint shadow is not part of the object: --alpha-threshold 0.1 takes it in"]
-        edge = opaque & binary_dilation(solid, eight) & ~binary_dilation(wide, eight)
+        edge = opaque & grown(solid) & ~grown(wide)
         return solid | edge, ["a soft shadow is not part of the object: --alpha-threshold 0.5 takes it in"]
     if of_object > WIDE_SHARE:
         return opaque, [f"{of_object:.0%} of the object is half transparent: --alpha-threshold 0.9 leaves it out"]

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from autopoly_env.arrays import AnyArray, BoolArray, Float32Array, FloatArray, IntArray
+from autopoly_env.silhouette.connectivity import areas
 
 # Distances are those of Oklab: 1 between black and white; what people just notice is about 0.01 to 0.02.
 SAME = 0.06  # colours this close are one
@@ -206,8 +207,6 @@ def _settled(points: Float32Array, centre: AnyArray) -> AnyArray:
 
 def _fading(features: Float32Array) -> Background | None:
     """The background as a smooth field, grown from the border inwards; None if the border is not like that."""
-    from skimage.measure import label
-
     height, width, n_channels = features.shape
     step = max(1, max(height, width) // STUDIED)
     small = np.ascontiguousarray(features[::step, ::step])
@@ -220,8 +219,8 @@ def _fading(features: Float32Array) -> Background | None:
     if float((border_residual < SAME).mean()) < 0.6:
         return None
     for order in FIELD_ORDERS:
-        parts = label(residual < 1.5 * SAME, connectivity=1)
-        reached = np.zeros(parts.max() + 1, dtype=bool)
+        parts, count = areas(residual < 1.5 * SAME)
+        reached = np.zeros(count + 1, dtype=bool)
         reached[border(parts)] = True
         reached[0] = False
         coefficients = _fit(basis, small, reached[parts], order)

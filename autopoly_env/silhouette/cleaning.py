@@ -4,7 +4,7 @@ import numpy as np
 
 from autopoly_env.arrays import BoolArray, IntArray
 from autopoly_env.silhouette.background import border
-from autopoly_env.silhouette.connectivity import label_holes, label_parts, meets_in_corners
+from autopoly_env.silhouette.connectivity import areas, grown, label_holes, label_parts, meets_in_corners, shrunk
 from autopoly_env.silhouette.options import ObjectOptions
 
 MIN_SPECK, SPECK_SHARE = 4, 2e-5  # smaller components are specks, smaller holes pinholes: pixels, of the picture's area
@@ -77,17 +77,12 @@ def square(mask: BoolArray) -> tuple[BoolArray, list[str]]:
 
 def parts(mask: BoolArray) -> tuple[IntArray, int]:
     """Component labels (H, W) of the object, 1.., 0 elsewhere; 8 neighbours. And how many there are."""
-    from skimage.measure import label
-
-    labels, count = label(mask, connectivity=2, return_num=True)
-    return labels, int(count)
+    return areas(mask, with_corners=True)
 
 
 def holes(mask: BoolArray) -> tuple[IntArray, IntArray]:
     """Labels (H, W) of the background, 1.., 4 neighbours, and which of them do not reach the border."""
-    from skimage.measure import label
-
-    labels, count = label(~mask, connectivity=1, return_num=True)
+    labels, count = areas(~mask)
     enclosed = np.ones(count + 1, dtype=bool)
     enclosed[0] = False
     enclosed[border(labels)] = False
@@ -111,10 +106,7 @@ def _word_on_dust(mask: BoolArray, least: int) -> str:
 
 def _without_notches(mask: BoolArray) -> BoolArray:
     """The mask (H, W) with its notches filled that are a pixel wide, as a pattern has along its border."""
-    from scipy.ndimage import binary_closing
-
-    closed: BoolArray = binary_closing(np.pad(mask, 2), np.ones((3, 3), dtype=bool))[2:-2, 2:-2]
-    return closed
+    return shrunk(grown(np.pad(mask, 2)))[2:-2, 2:-2]
 
 
 def _smaller_than(n_pixels: int, labels: IntArray, numbers: IntArray) -> tuple[BoolArray, int]:

@@ -9,8 +9,45 @@ Letters: R pixels a side.
 import numpy as np
 
 from autopoly_env.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from autopoly_env.silhouette import area_kernels
 
 LEVEL = 0.4990123  # of coverage, about half; a pixel covered by just this much would make contours touch, and none is
+
+
+def areas(mask: BoolArray, *, with_corners: bool = False) -> tuple[IntArray, int]:
+    """Labels (H, W) of what hangs together in a mask by 4 neighbours, or 8, 1.., 0 elsewhere; and how many there are.
+
+    They are numbered in the order of their first pixels, row by row.
+    """
+    labels, count = area_kernels.label_areas(_copy(mask), with_corners)
+    return labels, int(count)
+
+
+def distances_within(mask: BoolArray) -> FloatArray:
+    """(H, W) how far each pixel of a mask is from the nearest that is not in it, in pixels; infinite where none is."""
+    distances: FloatArray = area_kernels.distances_within(_copy(mask))
+    return distances
+
+
+def _copy(mask: BoolArray) -> BoolArray:
+    """Writable and in rows: Numba takes anything else for another type, and would compile for it."""
+    return np.array(mask, np.bool_, order="C")
+
+
+def grown(mask: BoolArray) -> BoolArray:
+    """The mask (H, W) and the 8 neighbours of its pixels."""
+    wider = mask.copy()
+    wider[1:] |= mask[:-1]
+    wider[:-1] |= mask[1:]
+    grown = wider.copy()
+    grown[:, 1:] |= wider[:, :-1]
+    grown[:, :-1] |= wider[:, 1:]
+    return grown
+
+
+def shrunk(mask: BoolArray) -> BoolArray:
+    """The pixels of the mask (H, W) all 8 neighbours of which are in it; beyond the picture nothing is."""
+    return ~grown(np.pad(~mask, 1, constant_values=True))[1:-1, 1:-1]
 
 
 def torn_corners(coverage: FloatArray) -> BoolArray:
@@ -21,7 +58,7 @@ def torn_corners(coverage: FloatArray) -> BoolArray:
     """
     filled = coverage > LEVEL
     thick = _thick(filled)
-    parts = _areas(filled)
+    parts = areas(filled)[0]
     torn = np.zeros((len(coverage) - 1, len(coverage) - 1), np.bool_)
     for falling in (True, False):
         (a, b), (c, d) = _diagonals(coverage, falling=falling)
@@ -37,14 +74,14 @@ def torn_corners(coverage: FloatArray) -> BoolArray:
 def label_parts(coverage: FloatArray) -> IntArray:
     """The parts, 1.., of a picture of coverages (R, R); 0 is background."""
     filled = coverage > LEVEL
-    return _joined(_areas(filled), filled, ~torn_corners(coverage))
+    return _joined(areas(filled)[0], filled, ~torn_corners(coverage))
 
 
 def label_holes(coverage: FloatArray) -> IntArray:
     """The holes, 1.., of a picture of coverages (R, R): background that does not reach the border; 0 elsewhere."""
     padded = np.pad(coverage, 1)
     empty = padded <= LEVEL
-    labels = _joined(_areas(empty), empty, torn_corners(padded))
+    labels = _joined(areas(empty)[0], empty, torn_corners(padded))
     names, numbers = np.unique(np.where(labels == labels[0, 0], 0, labels), return_inverse=True)
     assert names[0] == 0  # the background around
     return numbers.reshape(labels.shape)[1:-1, 1:-1]
@@ -60,15 +97,7 @@ def is_slanting_line(mask: BoolArray) -> bool:
     """Whether a mask (R, R) is nothing but lines one pixel wide, some of which hang together by corners alone."""
     if _thick(mask).any():
         return False
-    return int(_areas(mask).max()) > int(label_parts(mask.astype(np.float64)).max())
-
-
-def _areas(among: BoolArray) -> IntArray:
-    """Labels of the areas, 1.., that hang together by 4 neighbours; 0 elsewhere."""
-    from skimage.measure import label
-
-    labels: IntArray = label(among, connectivity=1)
-    return labels
+    return int(areas(mask)[0].max()) > int(label_parts(mask.astype(np.float64)).max())
 
 
 def _joined(labels: IntArray, among: BoolArray, open_corners: BoolArray) -> IntArray:

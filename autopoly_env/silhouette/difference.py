@@ -6,6 +6,7 @@ import numpy as np
 
 from autopoly_env.arrays import BoolArray, Float32Array, IntArray
 from autopoly_env.silhouette.background import Background, border
+from autopoly_env.silhouette.connectivity import areas
 
 LEAST = 0.012  # no smaller difference is told from none
 USUAL = 0.07  # from here on something is there, if nothing speaks against it
@@ -76,10 +77,8 @@ def _lowest(distances: Float32Array, faint: float, usual: float) -> float:
 
 def _is_dusty(distances: Float32Array, noise: float, level: float) -> bool:
     """Whether parts of their own lie between the noise and the usual cut: what lossy compression leaves at edges."""
-    from skimage.measure import label
-
-    faint, usual = (label(distances > cut, connectivity=2, return_num=True)[1] for cut in (noise, level))
-    return int(faint) - int(usual) > DUST
+    faint, usual = (areas(distances > cut, with_corners=True)[1] for cut in (noise, level))
+    return faint - usual > DUST
 
 
 def beyond_cut(features: Float32Array, distances: Float32Array, background: Background, level: float) -> BoolArray:
@@ -136,9 +135,7 @@ def paler_share(mask: BoolArray, distances: Float32Array, level: float) -> float
 
 def is_grainy(mask: BoolArray, distances: Float32Array) -> bool:
     """Whether a cut at FAINT finds grain all over a picture (H, W), apart from the mask."""
-    from skimage.measure import label
-
-    return int(label((distances > FAINT) & ~mask, connectivity=2, return_num=True)[1]) > GRAINS
+    return areas((distances > FAINT) & ~mask, with_corners=True)[1] > GRAINS
 
 
 def _outermost(mask: BoolArray) -> BoolArray:
@@ -153,10 +150,8 @@ def _outermost(mask: BoolArray) -> BoolArray:
 
 def filled(mask: BoolArray) -> BoolArray:
     """The mask (H, W) and its holes."""
-    from skimage.measure import label
-
-    labels = label(~mask, connectivity=1)
-    outside = np.zeros(int(labels.max()) + 1, dtype=bool)
+    labels, count = areas(~mask)
+    outside = np.zeros(count + 1, dtype=bool)
     outside[border(labels)] = True
     outside[0] = False
     return ~outside[labels]

@@ -8,6 +8,7 @@ from autopoly_env.silhouette import by_colour, by_lightness
 from autopoly_env.silhouette.alpha import Alpha, read_alpha
 from autopoly_env.silhouette.background import NO_FRAME, Frame, border, find_frame
 from autopoly_env.silhouette.colours import hex_of
+from autopoly_env.silhouette.connectivity import shrunk
 from autopoly_env.silhouette.inside_out import righted
 from autopoly_env.silhouette.loading import Picture
 from autopoly_env.silhouette.opinion import Opinion, View, are_alike, view_of
@@ -81,10 +82,7 @@ def _view_of(picture: Picture, alpha: Alpha | None) -> View:
 
 def _rim(opaque: BoolArray) -> BoolArray:
     """The opaque pixels beside clear ones and along the picture's border."""
-    from scipy.ndimage import binary_erosion
-
-    rim: BoolArray = opaque & ~binary_erosion(opaque, np.ones((3, 3), dtype=bool))
-    return rim
+    return opaque & ~shrunk(opaque)
 
 
 def _check_varied(picture: Picture, view: View, alpha: Alpha | None) -> None:

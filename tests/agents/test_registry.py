@@ -1,11 +1,14 @@
 """The registry: agents by name, their options, and what it says of wrong ones."""
 
+import subprocess
+import sys
 from typing import Any
 
 import pytest
 
 from agents.registry import AGENTS, make_agent
 from autopoly_env.errors import ConfigError
+from tests.helpers.paths import ROOT
 from tests.helpers.solving import simulator
 
 
@@ -17,6 +20,14 @@ def test_registry__names_agents_after_themselves() -> None:
             assert make_agent(name).name == name
         except ConfigError as error:
             assert "comes without weights" in str(error) and "weights=PATH" in str(error)
+
+
+def test_registry__loads_the_agent_that_is_asked_for_alone() -> None:
+    code = "import sys, agents.registry as r; r.make_agent('trace'); print(*sys.modules)"
+    modules = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    loaded = set(modules.split())
+    assert "agents.trace.agent" in loaded
+    assert not {"agents.search.mcts", "agents.quads.agent", "agents.rl.config", "gymnasium", "scipy.linalg"} & loaded
 
 
 @pytest.mark.parametrize(

@@ -143,9 +143,12 @@ def test_target_that_a_rectangle_matches__can_still_be_played() -> None:
 # --- imports
 
 
-def test_import__registers_all_ids_without_loading_what_only_an_episode_needs() -> None:
+@pytest.mark.parametrize("first", ["autopoly_env", "gymnasium"])
+def test_import__registers_all_ids_without_loading_what_only_an_episode_needs(first: str) -> None:
     code = (
-        "import sys, autopoly_env, gymnasium\n"
+        f"import sys, {first}, autopoly_env\n"
+        f"assert ('gymnasium' in sys.modules) == ({first!r} == 'gymnasium')\n"
+        "import gymnasium\n"
         f"assert all(name in gymnasium.registry for name in {list(IDS)!r})\n"
         "assert not {'torch', 'skimage', 'scipy', 'numba'}.intersection(sys.modules)"
     )
