@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from autopoly_env.arrays import FloatArray, IntArray
 from autopoly_env.errors import MeshError
+from autopoly_env.mesh import geometry_kernels
 from autopoly_env.mesh.drawing import Figure, drawing, groups
 from autopoly_env.mesh.topology import Face, Topology
 
@@ -102,6 +103,15 @@ class PolyMesh:
     def complexity(self) -> int:
         """V + E + F, the paper's r_sc."""
         return sum(self.counts)
+
+    @cached_property
+    def defects(self) -> tuple[int, int, int]:
+        """How many pairs of edges cross, how many are hairlines, how many faces are flipped or empty: see `sanity`."""
+        topology = self.topology
+        crossings, hairlines, flipped = geometry_kernels.defects(
+            self.vertices, topology.edges, topology.is_boundary_edge, topology.corners, topology.face_offsets
+        )
+        return int(crossings), int(hairlines), int(flipped)
 
     def face_areas(self) -> FloatArray:
         """(F,) signed shoelace areas in the unit square; negative for a flipped face."""

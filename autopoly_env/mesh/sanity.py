@@ -1,6 +1,5 @@
 """What is wrong with a valid mesh all the same: edges that cross, hairlines, faces flipped, empty or not allowed."""
 
-from autopoly_env.mesh import geometry_kernels
 from autopoly_env.mesh.face_rule import FaceRule, broken_faces
 from autopoly_env.mesh.polymesh import PolyMesh
 
@@ -11,11 +10,8 @@ def defects_of(mesh: PolyMesh, faces: FaceRule = "any") -> tuple[int, int]:
     A hairline is a pair of boundary edges that share no vertex and come closer than `CLEARANCE` without meeting: a
     corridor or a slit that shows in no picture, or two vertices as good as in one place.
     """
-    topology = mesh.topology
-    crossings, hairlines, flipped = geometry_kernels.defects(
-        mesh.vertices, topology.edges, topology.is_boundary_edge, topology.corners, topology.face_offsets
-    )
-    return int(crossings) + int(hairlines), int(flipped) + len(broken_faces(mesh, faces))
+    crossings, hairlines, flipped = mesh.defects
+    return crossings + hairlines, flipped + len(broken_faces(mesh, faces))
 
 
 def is_sane(mesh: PolyMesh, faces: FaceRule = "any") -> bool:

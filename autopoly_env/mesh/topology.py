@@ -7,12 +7,15 @@ corner that it leaves share their index.
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import accumulate, chain, pairwise
 from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from autopoly_env.arrays import BoolArray, IntArray
-from autopoly_env.mesh.flat import Flat
+from autopoly_env.errors import MeshError
+from autopoly_env.mesh import topology_kernels
+from autopoly_env.mesh.topology_kernels import Links
 
 MANY = 256  # corners of a mesh from which on single elements are looked up without tables of all
 
@@ -43,45 +46,42 @@ class Topology:
         return Topology, (self.n_vertices, self.faces)
 
     @cached_property
+    def arrays(self) -> Links:
+        """All of it as arrays, by one call of a kernel; the other properties follow from them.
+
+        Raises MeshError where a face has a vertex that there is not.
+        """
+        is_sound, links = topology_kernels.links_of(self.corners, self.face_offsets, self.n_vertices)
+        if not is_sound:
+            raise MeshError(f"a face has a vertex beyond the {self.n_vertices} that there are; give indices from 0")
+        return Links(*map(_read_only, links))
+
+    @cached_property
     def links(self) -> HalfEdges:
-        """How the half-edges hang together, H entries in each list but the last; all other properties follow from it.
+        """How the half-edges hang together, H entries in each list but the last.
 
         Numbered face by face, corner by corner. A valid mesh has each pair (tail, head) at most once.
         """
-        tails: list[int] = []
-        heads: list[int] = []
-        owners: list[int] = []
-        following: list[int] = []
-        offsets = [0]
-        for f, face in enumerate(self.faces):
-            start = len(tails)
-            tails += face
-            heads += face[1:]
-            heads.append(face[0])
-            owners += [f] * len(face)
-            following += range(start + 1, len(tails))
-            following.append(start)
-            offsets.append(len(tails))
-        index = {pair: h for h, pair in enumerate(zip(tails, heads, strict=True))}
-        twins = [index.get(pair, -1) for pair in zip(heads, tails, strict=True)]
-        return HalfEdges(tails, heads, owners, following, twins, offsets)
-
-    @cached_property
-    def _flat(self) -> Flat | None:
-        """The arrays to look single elements up in; None where tables of all are as quick."""
-        return Flat.of(self.n_vertices, self.faces) if self.n_corners >= MANY else None
+        arrays = self.arrays
+        tails, heads = arrays.half_edges.T.tolist()
+        lists = (array.tolist() for array in (arrays.owners, arrays.following, arrays.twins, self.face_offsets))
+        return HalfEdges(tails, heads, *lists)
 
     def edge_at(self, a: int, b: int) -> int:
         """The index of the edge between two vertex indices, -1 if there is none."""
-        if self._flat is not None:
-            return self._flat.edge(a, b)
-        return self.edge_lookup.get((a, b) if a < b else (b, a), -1)
+        low, high = (a, b) if a < b else (b, a)
+        if self.n_corners < MANY:
+            return self.edge_lookup.get((low, high), -1)
+        first, last = np.searchsorted(self.edges[:, 0], (low, low + 1)).tolist()
+        row = first + int(np.searchsorted(self.edges[first:last, 1], high))
+        return row if row < last and self.edges[row, 1] == high else -1
 
     def sides(self, edge: int) -> tuple[int, int]:
         """One of `edge_half_edges`."""
-        if self._flat is not None and "edge_half_edges" not in vars(self):
-            return self._flat.sides(edge)
-        return self.edge_half_edges[edge]
+        if self.n_corners < MANY:
+            return self.edge_half_edges[edge]
+        lower, other = self.arrays.sides[edge].tolist()
+        return lower, other
 
     def ends(self, half_edge: int) -> tuple[int, int]:
         """The vertices that a half-edge runs from and to."""
@@ -91,89 +91,66 @@ class Topology:
 
     def corner(self, half_edge: int) -> tuple[int, int]:
         """The face of a corner (= half-edge), and the corner's position in it."""
-        if self._flat is not None:
-            return self._flat.corner(half_edge)
-        face = self.links.faces[half_edge]
-        return face, half_edge - self.links.offsets[face]
+        face = int(self.arrays.owners[half_edge])
+        return face, half_edge - int(self.face_offsets[face])
 
     def first_corner(self, face: int) -> int:
         """The number of the first corner (= half-edge) of a face."""
-        return self.links.offsets[face] if self._flat is None else int(self._flat.offsets[face])
+        return int(self.face_offsets[face])
 
     def lone_corner(self, vertex: int) -> int:
         """One of `lone_corners`."""
-        if self._flat is not None and "lone_corners" not in vars(self):
-            return self._flat.lone_corner(vertex)
-        return self.lone_corners[vertex]
+        if self.n_corners < MANY:
+            return self.lone_corners[vertex]
+        found = np.flatnonzero(self.corners == vertex)
+        return int(found[0]) if len(found) == 1 else -1
 
     @cached_property
     def edge_lookup(self) -> dict[tuple[int, int], int]:
         """Edge index by its two vertex indices, the lower one first."""
-        links = self.links
-        rows = {(a, b) if a < b else (b, a) for a, b in zip(links.tails, links.heads, strict=True)}
-        return {pair: e for e, pair in enumerate(sorted(rows))}
+        return {(a, b): e for e, (a, b) in enumerate(self.edges.tolist())}
 
-    @cached_property
+    @property
     def half_edges(self) -> IntArray:
         """(H,2) directed edges (from, to) of all faces, face by face, corner by corner."""
-        return _read_only(np.array((self.links.tails, self.links.heads), np.int64).T)
+        return self.arrays.half_edges
 
-    @cached_property
+    @property
     def half_edge_face(self) -> IntArray:
         """(H,) the face of each half-edge."""
-        return _read_only(np.array(self.links.faces, np.int64))
+        return self.arrays.owners
 
     @cached_property
     def corners(self) -> IntArray:
         """(H,) the vertices of all faces, face by face: where each half-edge begins."""
-        return _read_only(np.array(self.links.tails, np.int64))
+        return _read_only(np.fromiter(chain.from_iterable(self.faces), np.int64))
 
     @cached_property
     def face_offsets(self) -> IntArray:
         """(F+1,) the corners of face f are rows face_offsets[f]:face_offsets[f+1] of `half_edges`."""
-        return _read_only(np.array(self.links.offsets, np.int64))
+        return _read_only(np.fromiter(accumulate(map(len, self.faces), initial=0), np.int64))
 
-    @cached_property
+    @property
     def edges(self) -> IntArray:
         """(E,2) vertex indices, ascending within a row and from row to row."""
-        rows = np.array(list(self.edge_lookup), np.int64) if self._flat is None else self._flat.edges
-        return _read_only(rows)
+        return self.arrays.edges
 
     @cached_property
     def edge_half_edges(self) -> list[tuple[int, int]]:
         """Per edge the half-edge of its lower face and that of its other face, -1 on the boundary."""
-        sides = [(-1, -1)] * len(self.edge_lookup)
-        links, lookup = self.links, self.edge_lookup
-        for h, (a, b) in enumerate(zip(links.tails, links.heads, strict=True)):
-            twin = links.twins[h]
-            if twin < 0 or h < twin:
-                sides[lookup[(a, b) if a < b else (b, a)]] = (h, twin)
-        return sides
+        return [(h, twin) for h, twin in self.arrays.sides.tolist()]
 
     @cached_property
     def edge_faces(self) -> IntArray:
         """(E,2) the one or two faces of each edge, the lower first, -1 where there is no second."""
-        owners = [*self.links.faces, -1]  # a missing half-edge, -1, reads the -1 at the end
-        return _read_only(np.array([(owners[h], owners[g]) for h, g in self.edge_half_edges], np.int64))
+        sides, owners = self.arrays.sides, self.arrays.owners
+        return _read_only(np.where(sides < 0, -1, owners[sides]))
 
-    @cached_property
+    @property
     def _boundary(self) -> list[list[int]]:
         """The boundary loops as half-edges; at a vertex the walk turns through the fan that it came in by."""
-        following, twins = self.links.following, self.links.twins
-        seen = [twin >= 0 for twin in twins]
-        loops = []
-        for start in range(len(twins)):
-            if seen[start]:
-                continue
-            loop, h = [], start
-            while not seen[h]:
-                seen[h] = True
-                loop.append(h)
-                h = following[h]
-                while twins[h] >= 0:
-                    h = following[twins[h]]
-            loops.append(loop)
-        return loops
+        rim = self.arrays.rim.tolist()
+        return [rim[begin:end] for begin, end in pairwise((0, *self.arrays.loop_ends.tolist()))]
 
     @cached_property
     def boundary_loops(self) -> tuple[IntArray, ...]:
@@ -181,15 +158,14 @@ class Topology:
 
         Where fans of faces meet in a single vertex (a pinch), each loop stays with its own fan.
         """
-        tails = self.links.tails
-        return tuple(_read_only(np.array([tails[h] for h in loop], np.int64)) for loop in self._boundary)
+        tails = self.boundary_half_edges[:, 0]
+        loops = pairwise((0, *self.arrays.loop_ends.tolist()))
+        return tuple(_read_only(tails[begin:end].copy()) for begin, end in loops)
 
     @cached_property
     def boundary_half_edges(self) -> IntArray:
         """(B,2) the directed edges of the boundary, loop by loop in the order of `boundary_loops`."""
-        tails, heads = self.links.tails, self.links.heads
-        rows = [(tails[h], heads[h]) for loop in self._boundary for h in loop]
-        return _read_only(np.array(rows, np.int64).reshape(-1, 2))
+        return _read_only(self.half_edges[self.arrays.rim])
 
     @cached_property
     def boundary_labels(self) -> IntArray:
@@ -216,13 +192,13 @@ class Topology:
     @cached_property
     def is_boundary_edge(self) -> BoolArray:
         """(E,) whether the edge has one face."""
-        return _read_only(np.array([g < 0 for _, g in self.edge_half_edges], np.bool_))
+        return _read_only(self.arrays.sides[:, 1] < 0)
 
     @cached_property
     def is_boundary_vertex(self) -> BoolArray:
         """(V,) whether the vertex lies on a boundary edge."""
         mask = np.zeros(self.n_vertices, np.bool_)
-        mask[self.boundary_half_edges[:, 0]] = True
+        mask[self.arrays.outer] = True
         return _read_only(mask)
 
     @cached_property
@@ -245,7 +221,7 @@ class Topology:
 
     @property
     def n_edges(self) -> int:
-        return len(self.edge_lookup) if self._flat is None else len(self._flat.keys)
+        return len(self.edges)
 
     @cached_property
     def n_corners(self) -> int:

@@ -49,8 +49,8 @@ class Disagreement:
     @cached_property
     def row_of_edge(self) -> dict[int, int]:
         """Row of `blame` by edge index."""
-        directed = self.mesh.topology.boundary_half_edges.tolist()
-        return {self.mesh.edge_index(a, b): row for row, (a, b) in enumerate(directed)}
+        arrays = self.mesh.topology.arrays
+        return {edge: row for row, edge in enumerate(arrays.edge_of[arrays.rim].tolist())}
 
     @cached_property
     def regions(self) -> FloatArray:

@@ -27,7 +27,7 @@ from autopoly_env.raster.raster_kernels import Picture
 from autopoly_env.refit import refit_kernels
 from autopoly_env.refit.rule_kernels import FREE, LOCKED, NO_RULE, Rule
 from autopoly_env.refit.shape_kernels import Settings, Shape, Ties
-from autopoly_env.silhouette import Silhouette, Target
+from autopoly_env.silhouette import Silhouette, Target, sums_with_background
 
 
 @dataclass(frozen=True)
@@ -62,8 +62,7 @@ class RefitTarget:
         `background` is what a pixel outside the silhouette weighs beside one inside.
         """
         sizes = [max(min(8, resolution), resolution // divisor) for divisor in (8, 4, 2, 1)]
-        targets = [_with_background(silhouette.target(size), background) for size in sizes]
-        pictures = [picture_of(target) for target in targets]
+        pictures = [_picture(silhouette.target(size), background) for size in sizes]
         return cls((pictures[0], pictures[1], pictures[2], pictures[3]))
 
     @property
@@ -143,11 +142,11 @@ def shape_for(topology: Topology, faces: FaceRule, bonds: Bonds | None) -> Shape
     return shape if bonds is None else _bound(shape, bonds)
 
 
-def _with_background(target: Target, background: float) -> Target:
+def _picture(target: Target, background: float) -> Picture:
+    """The target as refits see it, where a pixel outside weighs `background`."""
     if background == 1.0:
-        return target
-    weights = target.coverage + background * (1.0 - target.coverage)
-    return Target(target.coverage, weights if target.weights is None else weights * target.weights)
+        return picture_of(target)
+    return Picture(target.coverage, *sums_with_background(target, background))
 
 
 def _bound(shape: Shape, bonds: Bonds) -> Shape:
@@ -176,23 +175,17 @@ def _bound(shape: Shape, bonds: Bonds) -> Shape:
 @lru_cache(maxsize=4096)
 def shape_of(topology: Topology) -> Shape:
     """What the kernels need of a topology."""
-    directed = topology.boundary_half_edges
-    boundary = np.fromiter(dict.fromkeys(directed[:, 0].tolist()), np.int64)
-    unknown = np.full(topology.n_vertices, -1, np.int64)
-    unknown[boundary] = np.arange(len(boundary))
-    inner = np.flatnonzero(unknown < 0)
-    neighbours = [topology.edges[(topology.edges == v).any(axis=1)] for v in inner]
-    lists = [pairs[pairs != v] for pairs, v in zip(neighbours, inner, strict=True)]
+    arrays = topology.arrays
     return Shape(
-        boundary=boundary,
-        loops=np.ascontiguousarray(unknown[directed]),
-        edges=topology.edges,
+        boundary=arrays.outer.copy(),  # writable, as under bonds and rules: the kernel is compiled for one type
+        loops=arrays.loops.copy(),
+        edges=arrays.edges,
         on_rim=topology.is_boundary_edge,
         corners=topology.corners,
         offsets=topology.face_offsets,
-        inner=inner,
-        neighbours=np.concatenate([*lists, np.empty(0, np.int64)]),
-        neighbour_offsets=np.cumsum([0, *map(len, lists)]),
+        inner=arrays.inner.copy(),
+        neighbours=arrays.neighbours.copy(),
+        neighbour_offsets=arrays.neighbour_offsets.copy(),
     )
 
 

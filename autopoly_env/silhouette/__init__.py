@@ -4,7 +4,15 @@ from autopoly_env.silhouette.connectivity import LEVEL, areas, distances_within,
 from autopoly_env.silhouette.image_files import IMAGE_SUFFIXES, find_images
 from autopoly_env.silhouette.loading import ROUNDING, ImageSource, read_picture
 from autopoly_env.silhouette.options import DEFAULT_OPTIONS, ObjectOptions
-from autopoly_env.silhouette.silhouette import SMALL, WEIGHT_STEPS, Silhouette, Target, area_means, load_silhouette
+from autopoly_env.silhouette.silhouette import (
+    SMALL,
+    WEIGHT_STEPS,
+    Silhouette,
+    Target,
+    area_means,
+    load_silhouette,
+    sums_with_background,
+)
 from autopoly_env.silhouette.thumbnail import thumbnail
 
 __all__ = [
@@ -26,6 +34,7 @@ __all__ = [
     "label_parts",
     "load_silhouette",
     "read_picture",
+    "sums_with_background",
     "thumbnail",
     "torn_corners",
 ]

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from autopoly_env.arguments import whole
-from autopoly_env.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from autopoly_env.arrays import AnyArray, BoolArray, FloatArray
 from autopoly_env.errors import SilhouetteError
-from autopoly_env.silhouette import cleaning, object_mask
+from autopoly_env.silhouette import cleaning, object_mask, target_kernels
 from autopoly_env.silhouette.connectivity import is_slanting_line
 from autopoly_env.silhouette.image_files import find_images
 from autopoly_env.silhouette.loading import NAMELESS, ImageSource, Picture, read_frames
@@ -21,6 +21,8 @@ __all__ = ["SMALL", "ImageSource", "Silhouette", "Target", "find_images", "load_
 
 WEIGHT_STEPS = 2**20  # of a weight of 1
 MOST_RESOLUTION = 4096  # of a target
+_NO_WEIGHTS = np.empty((0, 0))
+_NO_WEIGHTS.setflags(write=False)
 SMALL = 64  # pixels a side; a smaller picture has too few pixels to tell shapes apart by counting them
 
 
@@ -58,20 +60,18 @@ class Target:
         coverage = np.array(self.coverage, dtype=np.float64, order="C")
         if coverage.ndim != 2 or coverage.shape[0] != coverage.shape[1] or coverage.size == 0:
             raise SilhouetteError(f"coverage has shape {coverage.shape}; expected a square (R, R): pad it")
-        mask = coverage >= 0.5
-        object.__setattr__(self, "coverage", _read_only(coverage))
-        object.__setattr__(self, "mask", _read_only(mask))
+        coverage = _read_only(coverage)  # before kernels see it, which take what is writable for another type
         weights = None if self.weights is None else _read_only(np.rint(self.weights * WEIGHT_STEPS) / WEIGHT_STEPS)
+        among = _NO_WEIGHTS if weights is None else weights
+        row_sum, row_square_sum, weight_sum = target_kernels.row_sums(coverage, among)
+        mask, mask_sum, n_filled = target_kernels.filled_sums(coverage, among)
+        self._set(coverage=coverage, mask=mask, row_sum=row_sum, row_square_sum=row_square_sum, mask_sum=mask_sum)
+        self._set(weights=weights, weight_sum=None if weights is None else weight_sum)
+        object.__setattr__(self, "n_filled", int(n_filled) if weights is None else float(n_filled))
 
-        def weighed(values: AnyArray) -> AnyArray:
-            return values if weights is None else values * weights
-
-        object.__setattr__(self, "weights", weights)
-        object.__setattr__(self, "weight_sum", None if weights is None else _row_prefix_sums(weights))
-        object.__setattr__(self, "row_sum", _row_prefix_sums(weighed(coverage)))
-        object.__setattr__(self, "row_square_sum", _row_prefix_sums(weighed(coverage**2)))
-        object.__setattr__(self, "mask_sum", _row_prefix_sums(weighed(mask.astype(np.float64))))
-        object.__setattr__(self, "n_filled", weighed(mask.astype(np.int64)).sum().item())
+    def _set(self, **arrays: AnyArray | None) -> None:
+        for name, array in arrays.items():
+            object.__setattr__(self, name, None if array is None else _read_only(array))
 
     @property
     def resolution(self) -> int:
@@ -138,7 +138,7 @@ class Silhouette:
         if resolution not in self._targets:
             weights = None if self.weights is None else area_means(self.weights, (resolution, resolution))
             by_area = self.is_scored_by_area and resolution == self.resolution
-            self._targets[resolution] = Target(_area_average(self.mask, resolution), weights, by_area)
+            self._targets[resolution] = Target(target_kernels.area_average(self.mask, resolution), weights, by_area)
         return self._targets[resolution]
 
     def pyramid(self, levels: Sequence[int]) -> tuple[Target, ...]:
@@ -196,16 +196,6 @@ def _first_object(source: ImageSource, options: ObjectOptions) -> tuple[Picture,
     raise SilhouetteError(f"{problems[0]} (so it is in all of its {len(problems)} frames)")
 
 
-def _area_average(mask: BoolArray, resolution: int) -> FloatArray:
-    """Mean of a (N, N) mask over each of resolution x resolution equal cells.
-
-    A cell overlaps a pixel by a whole number of 1/(N * resolution), so everything up to the last division is
-    exact integer arithmetic: a cell that is half object is exactly 0.5.
-    """
-    by_row = _cell_sums(mask.astype(np.int64), resolution)
-    return _cell_sums(by_row.T, resolution).T / mask.size
-
-
 def area_means(values: FloatArray, shape: tuple[int, int]) -> FloatArray:
     """Means of an image (H, W) over equal cells, as many as `shape` says; a cell may be smaller than a pixel."""
     for axis, n in enumerate(shape):
@@ -217,22 +207,15 @@ def area_means(values: FloatArray, shape: tuple[int, int]) -> FloatArray:
     return values
 
 
-def _cell_sums(values: IntArray, resolution: int) -> IntArray:
-    """(N, M) -> (resolution, M): sums over cells along the first axis; a pixel weighs `resolution` in all."""
-    n = len(values)
-    # the borders of the cells, in whole pixels and the rest of one
-    whole, rest = np.divmod(np.arange(resolution + 1) * n, resolution)
-    prefix = np.zeros((n + 1, values.shape[1]), dtype=np.int64)
-    np.cumsum(values, axis=0, out=prefix[1:])
-    begun_pixel = values[np.minimum(whole, n - 1)]  # past the last pixel the rest is 0
-    return np.diff(prefix[whole] * resolution + begun_pixel * rest[:, None], axis=0)
+def sums_with_background(target: Target, background: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """`row_sum`, `row_square_sum` and `weight_sum` of a target whose cells outside weigh `background`, those inside 1.
 
-
-def _row_prefix_sums(values: AnyArray) -> AnyArray:
-    n_rows, n_columns = values.shape
-    sums = np.zeros((n_rows, n_columns + 1), dtype=values.dtype)
-    np.cumsum(values, axis=1, out=sums[:, 1:])
-    return _read_only(sums)
+    Weights that the target has itself count as well. Read-only.
+    """
+    among = _NO_WEIGHTS if target.weights is None else target.weights
+    weights = _read_only(target_kernels.with_background(target.coverage, among, background, float(WEIGHT_STEPS)))
+    sums, squares, weight_sums = target_kernels.row_sums(target.coverage, weights)
+    return _read_only(sums), _read_only(squares), _read_only(weight_sums)
 
 
 def _read_only(array: AnyArray) -> AnyArray:

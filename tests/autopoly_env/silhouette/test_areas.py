@@ -9,7 +9,7 @@ from scipy import ndimage
 from skimage.measure import label
 
 from autopoly_env.arrays import BoolArray
-from autopoly_env.silhouette import areas, distances_within
+from autopoly_env.silhouette import WEIGHT_STEPS, Target, areas, distances_within, sums_with_background
 from autopoly_env.silhouette.connectivity import grown, shrunk
 
 MASKS = arrays(np.bool_, array_shapes(min_dims=2, max_dims=2, max_side=12))
@@ -58,3 +58,16 @@ def test_areas__take_masks_that_are_read_only_or_transposed() -> None:
     mask[:, 1] = mask[:, 3] = True
     mask.setflags(write=False)
     assert areas(mask)[1] == areas(mask.T)[1] == 2
+
+
+@given(st.integers(1, 24), st.integers(0, 16), st.booleans(), st.integers(0, 2**32 - 1))
+def test_sums__are_those_of_numpy_with_the_background_as_heavy_as_asked(
+    size: int, sixteenths: int, has_weights: bool, seed: int
+) -> None:
+    rng, background = np.random.default_rng(seed), sixteenths / 16
+    target = Target(rng.random((size, size)), rng.random((size, size)) if has_weights else None)
+    weights = target.coverage + background * (1.0 - target.coverage)
+    weights = np.rint((weights if target.weights is None else weights * target.weights) * WEIGHT_STEPS) / WEIGHT_STEPS
+    wanted = [np.cumsum(values * weights, axis=1) for values in (target.coverage, target.coverage**2, 1.0)]
+    for found, sums in zip(sums_with_background(target, background), wanted, strict=True):
+        assert (found[:, 0] == 0.0).all() and np.array_equal(found[:, 1:], sums)
