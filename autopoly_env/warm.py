@@ -42,6 +42,7 @@ with _leaving_at_ctrl_c(__name__ == "__main__"):
     from autopoly_env.compute import jit, n_threads
     from autopoly_env.details import Details, hairlines
     from autopoly_env.mesh import PolyMesh
+    from autopoly_env.observation import Observer
     from autopoly_env.operators import OPERATORS, legal_actions
     from autopoly_env.placement import Disagreement, tried
     from autopoly_env.raster import (
@@ -163,6 +164,8 @@ def pictures() -> None:
     hairlines(mesh, target)
     tune(mesh, target)
     Details.of(silhouette)
+    RefitTarget.of(silhouette, 32, 0.5)
+    Observer(4, 32, 1).observe(mesh, np.zeros((1, 32, 32), np.uint8), 1)
     coverage_vjp(batch_of([mesh]), np.ones((1, 32, 32)))
 
 

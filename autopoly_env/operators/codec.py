@@ -1,6 +1,7 @@
 """Actions by number, for a Discrete action space; which are legal; and what they are in words."""
 
-from collections.abc import Iterable
+from bisect import bisect_right
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -13,6 +14,8 @@ from autopoly_env.operators.action import STOP, Action
 from autopoly_env.operators.elements import CAPACITY_PER_VERTEX
 from autopoly_env.operators.operator import Operator
 from autopoly_env.operators.registry import operator_named, preset
+
+_COUNTED = ("vertex", "edge", "face")  # what a change is of
 
 
 class ActionCodec:
@@ -63,8 +66,9 @@ class ActionCodec:
             raise IllegalActionError(f"no action has index {index}; give 0..{self.n_actions - 1}")
         if index == 0:
             return STOP
-        name = max((name for name, start in self._start.items() if start <= index), key=self._start.__getitem__)
-        return Action(name, int(index) - self._start[name])
+        names, starts = tuple(self._start), tuple(self._start.values())
+        k = bisect_right(starts, index) - 1
+        return Action(names[k], int(index) - starts[k])
 
     def indices_of(self, operator: str) -> slice:
         """The numbers of all actions of an operator. Raises ConfigError if it is not one of the codec's."""
@@ -77,8 +81,9 @@ class ActionCodec:
         """(n_actions,) the actions that the mesh allows and that stay within the capacities; STOP always."""
         mask = np.zeros(self.n_actions, np.bool_)
         mask[0] = True
+        counts, limits = mesh.counts, [CAPACITY_PER_VERTEX[kind] * self.max_vertices for kind in _COUNTED]
         for operator in map(operator_named, self.operators):
-            legal = self._within_capacity(operator, mesh)
+            legal = _within_capacity(operator, mesh, counts, limits)
             start, n = self._start[operator.name], min(len(legal), self._capacity(operator))
             mask[start : start + n] = legal[:n]
         return mask
@@ -95,22 +100,27 @@ class ActionCodec:
     def _capacity(self, operator: Operator) -> int:
         return operator.element.per_vertex * self.max_vertices
 
-    def _within_capacity(self, operator: Operator, mesh: PolyMesh) -> BoolArray:
-        limits = [CAPACITY_PER_VERTEX[kind] * self.max_vertices for kind in ("vertex", "edge", "face")]
-        legal = operator.legal_mask(mesh).copy()
-        if operator.varies is not None:
-            for element in np.flatnonzero(legal).tolist():
-                legal[element] = _fits(mesh, operator.change_at(mesh, element), limits)
-            return legal
-        for i, change in enumerate(operator.changes):
-            if not _fits(mesh, change, limits):
-                legal[i :: len(operator.changes)] = False
+
+def _within_capacity(operator: Operator, mesh: PolyMesh, counts: Sequence[int], limits: Sequence[int]) -> BoolArray:
+    """The operator's mask, less what would take (V, E, F), which are `counts`, beyond the limits."""
+    legal = operator.legal_mask(mesh)
+    if operator.varies is not None:
+        changes = [operator.change_at(mesh, element) for element in np.flatnonzero(legal).tolist()]
+        if not all(_fits(counts, change, limits) for change in changes):
+            legal = legal.copy()
+            legal[legal] = [_fits(counts, change, limits) for change in changes]
         return legal
+    for i, change in enumerate(operator.changes):
+        if not _fits(counts, change, limits):
+            legal = legal.copy()
+            legal[i :: len(operator.changes)] = False
+    return legal
 
 
-def _fits(mesh: PolyMesh, change: tuple[int, int, int], limits: Iterable[int]) -> bool:
+def _fits(counts: Sequence[int], change: Sequence[int], limits: Sequence[int]) -> bool:
     """Whether (V, E, F) stay within the limits, as far as they grow."""
-    return not any(d > 0 and n + d > limit for n, d, limit in zip(mesh.counts, change, limits, strict=True))
+    (v, e, f), (dv, de, df), (most_v, most_e, most_f) = counts, change, limits
+    return (dv <= 0 or v + dv <= most_v) and (de <= 0 or e + de <= most_e) and (df <= 0 or f + df <= most_f)
 
 
 def legal_actions(mesh: PolyMesh, operators: Iterable[str]) -> list[Action]:

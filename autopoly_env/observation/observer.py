@@ -11,14 +11,16 @@ import numpy as np
 from autopoly_env.arrays import AnyArray, ByteArray, FloatArray
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
+from autopoly_env.observation import observation_kernels
 from autopoly_env.operators import CAPACITY_PER_VERTEX
-from autopoly_env.raster import coverage
+from autopoly_env.raster import workspace
 from autopoly_env.silhouette import Silhouette
 
 PADDING = -1  # of rows without an element
 POSITION_RANGE = (-1.0, 2.0)  # positions are clipped to it; the unit square lies in its middle
 
 Observation = dict[str, AnyArray]
+_WRITTEN = ("rendering", "vertices", "edges", "faces")
 
 
 @dataclass(frozen=True)
@@ -59,15 +61,23 @@ class Observer:
     def observe(self, mesh: PolyMesh, target: ByteArray, remaining_steps: int) -> Observation:
         """New arrays of what there is to see; `target` is what `picture_of` gives."""
         topology = mesh.topology
-        corners = np.column_stack((topology.half_edge_face, topology.corners))
-        n_vertices, n_edges, n_faces = mesh.counts
+        boundary, corners = topology.boundary_half_edges, topology.corners
+        size = self._resolution
+        rendering, vertices, edges, faces = (
+            np.empty(self.fields[name].shape, self.fields[name].dtype) for name in _WRITTEN
+        )
+        observation_kernels.observe(
+            *(mesh.vertices, boundary, topology.edges, topology.half_edge_face, corners),
+            *(*POSITION_RANGE, PADDING, workspace(size, len(boundary)), np.empty((size, size))),
+            *(rendering, vertices, edges, faces),
+        )
         return {
-            "rendering": as_bytes(coverage(mesh, self._resolution))[None],
+            "rendering": rendering,
             "target": target.copy(),
-            "vertices": self._padded("vertices", np.clip(mesh.vertices, *POSITION_RANGE)),
-            "edges": self._padded("edges", topology.edges),
-            "faces": self._padded("faces", corners),
-            "counts": np.array((n_vertices, n_edges, n_faces, len(corners)), np.int32),
+            "vertices": vertices,
+            "edges": edges,
+            "faces": faces,
+            "counts": np.array((*mesh.counts, len(corners)), np.int32),
             "remaining_steps": np.array((remaining_steps,), np.int32),
         }
 
@@ -81,12 +91,6 @@ class Observer:
                 raise ConfigError(
                     f"the mesh's {kind} count is {n}; at most {room} fit max_vertices={self._max_vertices}: raise that"
                 )
-
-    def _padded(self, name: str, rows: AnyArray) -> AnyArray:
-        field = self.fields[name]
-        array = np.full(field.shape, PADDING, field.dtype)
-        array[: rows.size] = rows.ravel()
-        return array
 
 
 def as_bytes(shares: FloatArray) -> ByteArray:
