@@ -3,6 +3,7 @@
 import operator
 import os
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any, SupportsFloat, cast
 
 import gymnasium
@@ -26,7 +27,29 @@ RENDER_MODES = ("rgb_array", "ansi")
 RESET_OPTIONS = ("target", "mesh", "state")
 ENDS = ("", "stop", "matched", "max_steps")  # what `info["end"]` numbers
 _ANY_SHAPE = Silhouette(np.ones((8, 8), np.bool_))  # stands for the target while the rules are checked
+KEPT = 64  # targets of all environments of a process, some 200 KB each at 64 x 64, for resets with the same seeds
 MOST_VERTICES = 10_000  # that arrays are padded to
+
+
+class _Source:
+    """A target source as one environment has it, which is a key of its own."""
+
+    def __init__(self, targets: TargetSource) -> None:
+        self.targets = targets
+
+
+@dataclass(slots=True)
+class _Beginning:
+    """A target that was drawn, with what it keeps, and the state before the first action once that is known."""
+
+    silhouette: Silhouette
+    initial: State | None = None
+
+
+@lru_cache(maxsize=KEPT)
+def _drawn(source: _Source, seed: int) -> _Beginning:
+    """The target of a seed; asked again, the same."""
+    return _Beginning(source.targets.sample(seed))
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,6 +164,7 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
     ) -> None:
         self.metadata = dict(type(self).metadata)  # SyncVectorEnv writes its autoreset mode into it
         self.targets = target_source(targets)
+        self._source = _Source(self.targets)
         self._seeds = SPLITS[one_of("split", split, tuple(SPLITS))]
         self._simulator_settings: dict[str, Any] = {
             "operators": operators,
@@ -193,7 +217,7 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
         if "state" in options:
             self.restore_state(options["state"])
         else:
-            yield from self._begin(self._silhouette(options), options.get("mesh"))
+            yield from self._begin(self._beginning(options), options.get("mesh"))
         return self._observation(), self._info()
 
     def step_routine(self, action: Any) -> Routine[tuple[Observation, float, bool, bool, dict[str, Any]]]:
@@ -274,20 +298,29 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
     def _simulator_of(self, silhouette: Silhouette) -> Simulator:
         return Simulator(silhouette, **self._simulator_settings)
 
-    def _silhouette(self, options: dict[str, Any]) -> Silhouette:
+    def _beginning(self, options: dict[str, Any]) -> "_Beginning":
         if "target" not in options:
-            return self.targets.sample(int(self.np_random.integers(self._seeds.start, self._seeds.stop)))
+            if self._source.targets is not self.targets:  # others were put in their place
+                self._source = _Source(self.targets)
+            return _drawn(self._source, int(self.np_random.integers(self._seeds.start, self._seeds.stop)))
         target = options["target"]
-        return target if isinstance(target, Silhouette) else load_silhouette(target)
+        return _Beginning(target if isinstance(target, Silhouette) else load_silhouette(target))
 
-    def _begin(self, silhouette: Silhouette, mesh: PolyMesh | None) -> Routine[None]:
+    def _begin(self, beginning: "_Beginning", mesh: PolyMesh | None) -> Routine[None]:
+        silhouette = beginning.silhouette
         if mesh is not None:
             if not isinstance(mesh, PolyMesh):
                 raise ConfigError(f"a mesh of type {type(mesh).__name__} was given: expected a PolyMesh")
             validate(mesh)
             self._observer.check_fits(mesh)
         simulator, picture = self._simulator_of(silhouette), self._observer.picture_of(silhouette)
-        initial = yield from simulator.initial_routine(mesh)
+        if mesh is not None:
+            initial = yield from simulator.initial_routine(mesh)
+        elif beginning.initial is None:
+            initial = beginning.initial = yield from simulator.initial_routine()
+        else:
+            initial = beginning.initial
+            simulator.n_refits += initial.n_refits
         state = replace(initial, done="")  # whether it is over is asked after a step
         self._simulator, self._picture = simulator, picture
         self._episode = EnvState(self._rules, silhouette, state, None, state.score.total, "start", False)
