@@ -126,6 +126,7 @@ def _faces_mask(points: FloatArray, faces: tuple[tuple[int, ...], ...], n: int) 
     return np.asarray(mask)
 
 
+@lru_cache(maxsize=4)
 def _target_mask(target: Silhouette, n: int) -> ByteArray:
     """(n, n) 1 on the target, 0 outside; smooth, unless its pixels are what the mesh is to have."""
     mask = np.zeros((n, n), np.uint8)
@@ -133,6 +134,7 @@ def _target_mask(target: Silhouette, n: int) -> ByteArray:
     way = Image.Resampling.NEAREST if target.is_scored_by_area else Image.Resampling.BILINEAR
     scaled = Image.fromarray(target.mask).convert("L").resize((end - start, end - start), way)
     mask[start:end, start:end] = np.asarray(scaled) >= 128
+    mask.setflags(write=False)
     return mask
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 Settings = Mapping[str, Any]
 RATIO, DIFFERENCE = "ratio", "difference"  # of this revision and the other one
-_TRAINING = ("run.total_steps=6144", "run.n_eval=2", "run.eval_every=100000", "run.minutes=0")
+_TRAINING = ("run.total_steps=10240", "run.n_eval=2", "run.eval_every=100000", "run.minutes=0")
 
 
 @dataclass(frozen=True)
