@@ -8,6 +8,7 @@ import typer
 
 from agents.commands import pictures
 from agents.commands.running import run_command
+from agents.commands.starting import loading
 from agents.commands.styles import default_style, describe_styles, style_named
 from agents.names import AGENT_NAMES
 from autopoly_env.errors import AutoPolyError
@@ -277,13 +278,14 @@ def solve(
     ] = False,
 ) -> int:
     """Check everything that can be checked before the work, then do it; return the exit code."""
-    from agents.budget import Budget
-    from agents.commands.columns import read_columns
-    from agents.commands.report import FORMATS, Report
-    from agents.commands.results import claim_folder
-    from agents.commands.solving import Settings, name_jobs, solve_all
-    from agents.commands.wishes import read_wishes
-    from autopoly_env.score import ScoreWeights
+    with loading():
+        from agents.budget import Budget
+        from agents.commands.columns import read_columns
+        from agents.commands.report import FORMATS, Report
+        from agents.commands.results import claim_folder
+        from agents.commands.solving import Settings, name_jobs, solve_all
+        from agents.commands.wishes import read_wishes
+        from autopoly_env.score import ScoreWeights
 
     shown = read_columns(columns, FORMATS, ())
     weights = ScoreWeights(w_sm, w_sc, w_si, w_locality)

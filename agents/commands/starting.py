@@ -5,11 +5,13 @@ though it was caught: it ends itself by SIGINT. So what was interrupted leaves b
 """
 
 import atexit
+import gc
 import os
 import signal
 import sys
 import time
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import NoReturn
 
@@ -32,6 +34,17 @@ def guard_imports() -> None:
     if not _is_command:
         _is_command = True
         atexit.register(_leave_interrupted)  # before anybody else's, hence called after them
+
+
+@contextmanager
+def loading() -> Iterator[None]:
+    """Where modules are imported: nothing of that is garbage, and to look for some takes a twentieth of a start."""
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 def listen() -> None:

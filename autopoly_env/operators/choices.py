@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from typing import Annotated, Any
 
 import numpy as np
@@ -50,7 +51,9 @@ class _Hole:
     bridges: tuple[tuple[_Id, _Id], tuple[_Id, _Id]]
 
 
-_HOLE = TypeAdapter(_Hole)
+@cache
+def _reader() -> TypeAdapter[_Hole]:
+    return TypeAdapter(_Hole)
 
 
 def _corner_choice_ids(mesh: PolyMesh, _corner: int, choice: Choice) -> ChoiceIds:
@@ -124,7 +127,7 @@ def _hole_choice_ids(mesh: PolyMesh, hole: int, choice: Choice) -> ChoiceIds:
 
 def _hole_choice(mesh: PolyMesh, hole: int, ids: ChoiceIds) -> Choice:
     try:
-        plan = _HOLE.validate_python(ids)
+        plan = _reader().validate_python(ids)
     except ValidationError as error:
         defect = first_defect(error)
         place = ".".join(("choice", *map(str, defect.place or ("all of it",))))

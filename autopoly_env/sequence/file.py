@@ -3,6 +3,7 @@
 import json
 import math
 from dataclasses import asdict, dataclass
+from functools import cache
 from typing import Annotated, Any, NoReturn
 
 import numpy as np
@@ -83,7 +84,10 @@ class _Document:
     steps: tuple[Step, ...]
 
 
-_DOCUMENT = TypeAdapter(_Document)
+@cache
+def _reader() -> TypeAdapter[_Document]:
+    """Made when a file is read: that takes longer than reading it, and most commands read none."""
+    return TypeAdapter(_Document)
 
 
 def dump_json(settings: dict[str, Any], start: PolyMesh, start_score: PlainScore, steps: tuple[Step, ...]) -> str:
@@ -116,7 +120,7 @@ def parse_json(text: str) -> tuple[dict[str, Any], PolyMesh, PlainScore, tuple[S
     if data.get("version") not in VERSIONS or type(data["version"]) is not int:
         raise SequenceError(f"the version is {short(data.get('version'))}; this release reads versions 1 and 2")
     try:
-        document = _DOCUMENT.validate_python(data)
+        document = _reader().validate_python(data)
     except ValidationError as error:
         raise SequenceError(_first_defect(error)) from None
     check_score(document.start.score, "start")
