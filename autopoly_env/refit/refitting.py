@@ -1,9 +1,10 @@
 """Inverse shape estimation: move all vertices of a mesh so that its rendering matches a target.
 
 The picture is an exact function of the vertices, so this is a small least-squares problem: residual = coverage -
-target per pixel, 2V unknowns, a Jacobian that is zero off the boundary. Levenberg-Marquardt runs up the target's
-pyramid. On the coarse levels an elastic term keeps boundary edges near what they were: it carries an outline to a
-target many pixels away without tangling it, which plain gradient descent (the optional far phase) does not.
+target per pixel, 2V unknowns, a Jacobian that is zero off the boundary. Limited-memory BFGS about the damped normal
+equations runs up the target's pyramid. On the coarse levels an elastic term keeps boundary edges near what they were:
+it carries an outline to a target many pixels away without tangling it, which plain gradient descent (the optional far
+phase) does not.
 
 Vertices may be bound (`Bonds`): then fewer unknowns lead, and gradient and normal equations are reduced to those.
 
@@ -35,7 +36,7 @@ class RefitConfig:
     """How hard a refit tries."""
 
     first_level: int = 0  # of the pyramid's 4 levels (R/8, R/4, R/2, R), where to begin; 2 for a mesh that nearly fits
-    n_near: int = 20  # Levenberg-Marquardt steps on each level, at most
+    n_near: int = 20  # quasi-Newton steps on each level, at most
     n_far: int = 0  # Adam steps that try to leave the optimum found, 0 for none
     stiffness: float = 0.1  # elastic term on the second level; 0.3 of it on the next, none on the last
     damping: float = 0.05  # absolute damping, in squared pixels: holds vertices that slide along a straight edge
