@@ -61,7 +61,7 @@ class EnvState:
     state: State
     previous: PolyMesh | None  # the mesh one step earlier; None at the start
     best_r_all: float  # since the start
-    action: str  # of the last step, in words
+    action: Action | None  # of the last step, at elements of `previous`; None at the start
     illegal: bool  # whether that was illegal
     no_room: tuple[int, ...] = ()  # actions that the mesh as it is has proved to have no room for
 
@@ -229,7 +229,7 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
         illegal = not self._legal_mask()[index]
         after = None if illegal else (yield from self._transition(before, chosen))
         no_room = (index,) if after is None and not illegal else ()
-        self._advance(after or self._simulator.idle(before), describe(before.mesh, chosen), illegal, no_room)
+        self._advance(after or self._simulator.idle(before), chosen, illegal, no_room)
         done = self.state.done
         return self._observation(), self._reward(before), done in ("stop", "matched"), done == "max_steps", self._info()
 
@@ -238,7 +238,7 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
         if self.render_mode is None:
             return None
         episode, score = self._current(), self.state.score
-        happened = "nothing (illegal action)" if episode.illegal else episode.action
+        happened = "nothing (illegal action)" if episode.illegal else _words(episode)
         title = f"step {episode.state.step} of {self._simulator.max_steps}: {happened}"
         facts = f"r_all {score.total:.2f}   r_sm {score.iou:.3f}   r_sc {score.complexity}   r_si "
         facts += f"{score.self_intersections}   best r_all {episode.best_r_all:.2f}"
@@ -323,7 +323,7 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
             simulator.n_refits += initial.n_refits
         state = replace(initial, done="")  # whether it is over is asked after a step
         self._simulator, self._picture = simulator, picture
-        self._episode = EnvState(self._rules, silhouette, state, None, state.score.total, "start", False)
+        self._episode = EnvState(self._rules, silhouette, state, None, state.score.total, None, False)
         self._mask = None
 
     def _transition(self, state: State, action: Action) -> Routine[State | None]:
@@ -333,7 +333,7 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
         except IllegalActionError:
             return None
 
-    def _advance(self, state: State, action: str, illegal: bool, no_room: tuple[int, ...]) -> None:
+    def _advance(self, state: State, action: Action, illegal: bool, no_room: tuple[int, ...]) -> None:
         now = self._current()
         best, known = max(now.best_r_all, state.score.total), (*now.no_room, *no_room) if illegal or no_room else ()
         self._episode = EnvState(self._rules, now.silhouette, state, now.state.mesh, best, action, illegal, known)
@@ -349,7 +349,8 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
             self._mask = self.codec.legal_mask(self.state.mesh)
             if self._simulator.faces != "any":
                 self._mask &= self.codec.mask_of(self._simulator.legal_actions(self.state))
-            self._mask[list(self._current().no_room)] = False
+            if self._current().no_room:
+                self._mask[list(self._current().no_room)] = False
         return self._mask
 
     def _observation(self) -> Observation:
@@ -375,7 +376,7 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
             "action_mask": self._legal_mask().astype(np.int8),
         }
         if self._info_texts:
-            info |= {"action": episode.action, "ended_by": episode.state.done, "target": episode.silhouette.name}
+            info |= {"action": _words(episode), "ended_by": episode.state.done, "target": episode.silhouette.name}
         return info
 
     def _index(self, action: Any) -> int:
@@ -388,6 +389,13 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
         if not 0 <= index < self.codec.n_actions:
             raise IllegalActionError(f"action {index} does not exist; give one of 0..{self.codec.n_actions - 1}")
         return index
+
+
+def _words(episode: EnvState) -> str:
+    """The action of the last step."""
+    if episode.action is None or episode.previous is None:
+        return "start"
+    return describe(episode.previous, episode.action)
 
 
 def _checked_options(options: dict[str, Any] | None) -> dict[str, Any]:

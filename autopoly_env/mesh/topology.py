@@ -47,14 +47,16 @@ class Topology:
 
     @cached_property
     def arrays(self) -> Links:
-        """All of it as arrays, by one call of a kernel; the other properties follow from them.
+        """All of it as arrays, by one call of a kernel; the other properties follow from them. Not to be written to.
 
         Raises MeshError where a face has a vertex that there is not.
         """
         is_sound, links = topology_kernels.links_of(self.corners, self.face_offsets, self.n_vertices)
         if not is_sound:
             raise MeshError(f"a face has a vertex beyond the {self.n_vertices} that there are; give indices from 0")
-        return Links(*map(_read_only, links))
+        for array in (links.half_edges, links.owners, links.edges, links.boundary):  # which others are given
+            _read_only(array)
+        return links
 
     @cached_property
     def links(self) -> HalfEdges:
@@ -162,10 +164,10 @@ class Topology:
         loops = pairwise((0, *self.arrays.loop_ends.tolist()))
         return tuple(_read_only(tails[begin:end].copy()) for begin, end in loops)
 
-    @cached_property
+    @property
     def boundary_half_edges(self) -> IntArray:
         """(B,2) the directed edges of the boundary, loop by loop in the order of `boundary_loops`."""
-        return _read_only(self.half_edges[self.arrays.rim])
+        return self.arrays.boundary
 
     @cached_property
     def boundary_labels(self) -> IntArray:

@@ -23,6 +23,7 @@ class Links(NamedTuple):
     sides: IntArray  # (E, 2) the half-edge of the lower face and that of the other, -1 on the boundary
     edge_of: IntArray  # (H,) the edge of each half-edge
     rim: IntArray  # (B,) the half-edges of the boundary, loop by loop
+    boundary: IntArray  # (B, 2) from, to of each of these
     loop_ends: IntArray  # (L,) where each loop ends in `rim`
     outer: IntArray  # (N,) the vertices of the boundary as the loops pass them
     loops: IntArray  # (B, 2) the half-edges of `rim` between rows of `outer`
@@ -51,10 +52,10 @@ def links_of(corners: IntArray, offsets: IntArray, n_vertices: int) -> tuple[boo
     order = _by_edge(half_edges[:n], n_vertices)
     twins, edges, sides, edge_of = _paired(half_edges[:n], order)
     rim, loop_ends = _rim(following, twins)
-    outer, loops, row_of = _outline(half_edges, rim, n_vertices)
+    outer, boundary, loops, row_of = _outline(half_edges, rim, n_vertices)
     inner, neighbours, neighbour_offsets = _inside(edges, row_of, len(outer))
     links = Links(
-        *(half_edges, owners, following, twins, edges, sides, edge_of, rim, loop_ends),
+        *(half_edges, owners, following, twins, edges, sides, edge_of, rim, boundary, loop_ends),
         *(outer, loops, inner, neighbours, neighbour_offsets),
     )
     return is_sound, links
@@ -138,19 +139,20 @@ def _rim(following: IntArray, twins: IntArray) -> tuple[IntArray, IntArray]:
 
 
 @kernel
-def _outline(half_edges: IntArray, rim: IntArray, n_vertices: int) -> tuple[IntArray, IntArray, IntArray]:
-    """The boundary's vertices (N,), its half-edges (B, 2) between them, and the row (V,) of each vertex, -1 inside."""
+def _outline(half_edges: IntArray, rim: IntArray, n_vertices: int) -> tuple[IntArray, IntArray, IntArray, IntArray]:
+    """The boundary's vertices (N,), its half-edges (B, 2) between all and between these, the row (V,) of each or -1."""
     row_of, outer, n_outer = np.full(n_vertices, -1, np.int64), np.empty(n_vertices, np.int64), 0
-    loops = np.empty((len(rim), 2), np.int64)
+    boundary, loops = np.empty((len(rim), 2), np.int64), np.empty((len(rim), 2), np.int64)
     for k in range(len(rim)):
         v = half_edges[rim[k], 0]
+        boundary[k, 0], boundary[k, 1] = v, half_edges[rim[k], 1]
         if row_of[v] < 0:
             row_of[v] = n_outer
             outer[n_outer] = v
             n_outer += 1
     for k in range(len(rim)):
-        loops[k, 0], loops[k, 1] = row_of[half_edges[rim[k], 0]], row_of[half_edges[rim[k], 1]]
-    return outer[:n_outer].copy(), loops, row_of
+        loops[k, 0], loops[k, 1] = row_of[boundary[k, 0]], row_of[boundary[k, 1]]
+    return outer[:n_outer].copy(), boundary, loops, row_of
 
 
 @kernel

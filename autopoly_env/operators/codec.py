@@ -39,6 +39,7 @@ class ActionCodec:
         for operator in map(operator_named, operators):
             self._start[operator.name] = self.n_actions
             self.n_actions += self._capacity(operator)
+        self._names, self._starts = tuple(self._start), tuple(self._start.values())
 
     def __getstate__(self) -> dict[str, Any]:
         return {**vars(self), "operators": tuple(map(operator_named, self.operators))}
@@ -66,9 +67,8 @@ class ActionCodec:
             raise IllegalActionError(f"no action has index {index}; give 0..{self.n_actions - 1}")
         if index == 0:
             return STOP
-        names, starts = tuple(self._start), tuple(self._start.values())
-        k = bisect_right(starts, index) - 1
-        return Action(names[k], int(index) - starts[k])
+        k = bisect_right(self._starts, index) - 1
+        return Action(self._names[k], int(index) - self._starts[k])
 
     def indices_of(self, operator: str) -> slice:
         """The numbers of all actions of an operator. Raises ConfigError if it is not one of the codec's."""
@@ -82,10 +82,12 @@ class ActionCodec:
         mask = np.zeros(self.n_actions, np.bool_)
         mask[0] = True
         counts, limits = mesh.counts, [CAPACITY_PER_VERTEX[kind] * self.max_vertices for kind in _COUNTED]
-        for operator in map(operator_named, self.operators):
-            legal = _within_capacity(operator, mesh, counts, limits)
-            start, n = self._start[operator.name], min(len(legal), self._capacity(operator))
-            mask[start : start + n] = legal[:n]
+        for name, start in self._start.items():
+            operator = operator_named(name)
+            legal, capacity = _within_capacity(operator, mesh, counts, limits), self._capacity(operator)
+            if len(legal) > capacity:
+                legal = legal[:capacity]
+            mask[start : start + len(legal)] = legal
         return mask
 
     def mask_of(self, actions: Iterable[Action]) -> BoolArray:

@@ -6,6 +6,7 @@ half-edges); others come `n_each` to one of these, such as holes of 3 and of 4 c
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 from autopoly_env.errors import SequenceError
 from autopoly_env.mesh import PolyMesh
@@ -27,7 +28,7 @@ class ElementKind:
     words: Callable[[ElementIds], str]  # the element in a sentence, with ids
     variants: tuple[str, ...] = ("",)  # what tells the elements at one place apart: element % n_each is which
 
-    @property
+    @cached_property
     def n_each(self) -> int:
         """How many elements lie at one place."""
         return len(self.variants)

@@ -16,7 +16,7 @@ each pixel times its weight where the target has weights.
 """
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -42,6 +42,19 @@ class RefitConfig:
     damping: float = 0.05  # absolute damping, in squared pixels: holds vertices that slide along a straight edge
     tolerance: float = 2e-3  # relative gain of a step below which a level is done
     keep_defects: bool = False  # allow new self-intersections and flipped faces
+
+    @cached_property
+    def settings(self) -> Settings:
+        """The same for the kernel, each of its type."""
+        return Settings(
+            int(self.first_level),
+            int(self.n_near),
+            int(self.n_far),
+            float(self.stiffness),
+            float(self.damping),
+            float(self.tolerance),
+            bool(self.keep_defects),
+        )
 
 
 DEFAULT = RefitConfig()
@@ -122,15 +135,7 @@ def refit(
         mesh.vertices,
         shape,
         target.pictures,
-        Settings(
-            int(config.first_level),
-            int(config.n_near),
-            int(config.n_far),
-            float(config.stiffness),
-            float(config.damping),
-            float(config.tolerance),
-            bool(config.keep_defects),
-        ),
+        config.settings,
         workspace(target.resolution, len(shape.loops)),
         moved,
     )
@@ -178,15 +183,15 @@ def shape_of(topology: Topology) -> Shape:
     """What the kernels need of a topology."""
     arrays = topology.arrays
     return Shape(
-        boundary=arrays.outer.copy(),  # writable, as under bonds and rules: the kernel is compiled for one type
-        loops=arrays.loops.copy(),
+        boundary=arrays.outer,  # writable, as under bonds and rules: the kernel is compiled for one type
+        loops=arrays.loops,
         edges=arrays.edges,
         on_rim=topology.is_boundary_edge,
         corners=topology.corners,
         offsets=topology.face_offsets,
-        inner=arrays.inner.copy(),
-        neighbours=arrays.neighbours.copy(),
-        neighbour_offsets=arrays.neighbour_offsets.copy(),
+        inner=arrays.inner,
+        neighbours=arrays.neighbours,
+        neighbour_offsets=arrays.neighbour_offsets,
     )
 
 

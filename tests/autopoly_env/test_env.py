@@ -16,6 +16,7 @@ from autopoly_env.conformance import check_env as check_autopoly_env
 from autopoly_env.env import AutoPolyEnv
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
+from autopoly_env.silhouette import Silhouette
 from tests.helpers.environments import BOX, IDS, SMALL, begun, index_of, l_shape, make, play, same
 from tests.helpers.paths import ROOT
 
@@ -138,6 +139,47 @@ def test_target_that_a_rectangle_matches__can_still_be_played() -> None:
     _, info = env.reset(options={"target": mask})
     assert (info["r_sm"], info["ended_by"]) == (1.0, "")
     assert env.step(0)[2] is True
+
+
+# --- the same seeds again
+
+
+class Counting:
+    """Squares of which each has its seed's side, and how often they were drawn."""
+
+    def __init__(self) -> None:
+        self.n_drawn = 0
+
+    @property
+    def name(self) -> str:
+        return "squares"
+
+    def sample(self, seed: int) -> Silhouette:
+        self.n_drawn += 1
+        mask = np.zeros((32, 32), bool)
+        mask[4 : 12 + seed % 16, 4 : 12 + seed % 16] = True
+        return Silhouette(mask, f"square {seed}")
+
+
+def test_reset__to_a_seed_of_before_draws_no_target_and_begins_alike() -> None:
+    source = Counting()
+    env = make(targets=source)
+    first, info = env.reset(seed=5)
+    mesh, n_refits = env.state.mesh, env.simulator.n_refits
+    env.step(index_of(env, "edge_subdivide", 0))
+    again, info_again = env.reset(seed=5)
+    assert source.n_drawn == 1
+    assert env.state.mesh == mesh and env.simulator.n_refits == n_refits
+    assert all(np.array_equal(first[name], again[name]) for name in first)
+    assert {name: str(value) for name, value in info.items()} == {name: str(v) for name, v in info_again.items()}
+
+
+def test_reset__after_other_targets_were_put_in_place_draws_those() -> None:
+    env, other = make(targets=Counting()), Counting()
+    env.reset(seed=5)
+    env.targets = other
+    env.reset(seed=5)
+    assert other.n_drawn == 1
 
 
 # --- imports
