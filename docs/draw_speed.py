@@ -23,7 +23,7 @@ import numpy as np
 from numba.core.dispatcher import Dispatcher
 
 PICTURE = Path(__file__).parent / "pictures" / "speed.svg"
-N_WARM, N_STEPS = 300, 3000
+N_WARM, N_STEPS, N_ROUNDS = 300, 1500, 4
 WIDTH, LEFT, BAR, GAP = 1000, 120, 46, 92  # pixels; GAP from one bar to the next
 PARTS = {  # what is drawn: its colour; all but the first two is Python
     "refit kernel": "#2f7d4f",
@@ -84,16 +84,19 @@ class Clock:
 
 
 def measure() -> dict[str, float]:
-    """Microseconds of a step by part."""
+    """Microseconds of a step by part, in the quickest of a few rounds."""
     env = gymnasium.make("autopoly_env:AutoPoly-v0", resolution=64).unwrapped
     play(env, N_WARM, 1)
     clock = Clock()
     clock.put_in()
     step = clock.timed(env.step, "the rest")
     env.step = step  # type: ignore[method-assign]
-    clock.spent.clear()
-    play(env, N_STEPS, 2, clock)
-    return {part: clock.spent[part] / N_STEPS for part in PARTS}
+    rounds = []
+    for _ in range(N_ROUNDS):
+        clock.spent.clear()
+        play(env, N_STEPS, 2, clock)
+        rounds.append({part: clock.spent[part] / N_STEPS for part in PARTS})
+    return min(rounds, key=lambda parts: sum(parts.values()))
 
 
 def play(env: Any, n_steps: int, seed: int, clock: Clock | None = None) -> None:
@@ -129,7 +132,7 @@ def drawing(bars: dict[str, dict[str, float]]) -> str:
                 f'<rect x="{x:.1f}" y="{y}" width="{width:.1f}" height="{BAR}" fill="{PARTS[part]}"><title>'
                 f"{part}: {value:.0f} µs</title></rect>"
             )
-            if width > 28:
+            if width > 22:
                 lines.append(f'<text x="{x + width / 2:.1f}" y="{y + 28}" text-anchor="middle">{value:.0f}</text>')
             x += width
         whole = sum(parts.values())

@@ -41,4 +41,6 @@ def _logged(log: Path) -> dict[str, float]:
     """Steps a second of a training, of the last line that has them."""
     lines = map(json.loads, log.read_text(encoding="utf-8").splitlines())
     rates = [line["train/steps_per_second"] for line in lines if "train/steps_per_second" in line]
-    return {"steps": rates[-1]} if rates else {}
+    if not rates:
+        raise RuntimeError("the training's log has no steps a second: it was too short")
+    return {"steps": rates[-1]}
