@@ -1,17 +1,20 @@
 """How much work a solve may do, and how much it has done."""
 
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from typing import TypeVar
 
 from agents.solution import Stats
 from autopoly_env.errors import ConfigError
+from autopoly_env.mesh import PolyMesh
 from autopoly_env.shown import short
 from autopoly_env.simulator import State
 
 _Start = TypeVar("_Start")
+Shape = Callable[[], PolyMesh]  # makes the mesh of a shape, or its rings as faces, holes wound backwards
 
 
 # A tree search is bounded also where its states cost no refit, as those of WarpNet, or nothing new is made.
@@ -55,6 +58,31 @@ class Progress:
     n_steps: int
     n_refits: int
     n_nodes: int = 0  # of the search tree, where there is one
+    best: Shape | None = None  # the best shape so far, where the agent shows it
+    tried: Shape | None = None  # the one that was tried last
+
+
+class Clock:
+    """The seconds that budgets count: those of a pause stand still. One for a process, which solves one at a time."""
+
+    def __init__(self) -> None:
+        self._paused = 0.0
+
+    def seconds(self) -> float:
+        """Seconds since some moment, pauses left out."""
+        return time.perf_counter() - self._paused
+
+    @contextmanager
+    def standing(self) -> Iterator[None]:
+        """A pause."""
+        began = time.perf_counter()
+        try:
+            yield
+        finally:
+            self._paused += time.perf_counter() - began
+
+
+CLOCK = Clock()
 
 
 class Meter:
@@ -71,8 +99,9 @@ class Meter:
         self._most_states = min(MOST_STATES, n_refits)
         self._on_progress = on_progress
         self._whole = whole
-        self._began = time.perf_counter()
+        self._began = CLOCK.seconds()
         self._n_steps = self._n_refits = self._n_simulations = self._n_nodes = 0
+        self._best: Shape | None = None
         self._best_total = float("-inf")
         self.stopped_by = "finished"
 
@@ -90,8 +119,12 @@ class Meter:
 
         `n_refits` that the simulator has counted meanwhile are more than those of the states where some had no room.
         """
-        best = max((state.score.total for state in states), default=float("-inf"))
-        self.count(max(n_refits, sum(state.n_refits for state in states)), best)
+        best = max(states, key=lambda state: state.score.total, default=None)
+        n_refits = max(n_refits, sum(state.n_refits for state in states))
+        if best is None:
+            self.count(n_refits, float("-inf"))
+        else:
+            self.count(n_refits, best.score.total, lambda: best.mesh)
 
     def add_simulation(self, n_nodes: int) -> None:
         """Note a simulation that made so many new nodes, before what it did is added or counted."""
@@ -100,15 +133,20 @@ class Meter:
         if self._whole is not None:
             self._whole.add_simulation(n_nodes)
 
-    def count(self, n_refits: int, best_total: float) -> None:
-        """Note one step of work that took `n_refits` and whose best shape has r_all `best_total`."""
+    def count(self, n_refits: int, best_total: float, shape: Shape | None = None) -> None:
+        """Note one step of work that took `n_refits` and whose best shape has r_all `best_total`.
+
+        `shape` makes that one's mesh, for whoever watches; it is called while the step is reported, or never.
+        """
         self._n_steps += 1
         self._n_refits += n_refits
-        self._best_total = max(self._best_total, best_total)
+        if best_total > self._best_total:
+            self._best_total, self._best = best_total, shape or self._best
         if self._whole is not None:
-            self._whole.count(n_refits, best_total)
+            self._whole.count(n_refits, best_total, shape)
         if self._on_progress is not None:
-            self._on_progress(Progress(self._best_total, self._n_steps, self._n_refits, self._n_nodes))
+            seen = self._n_steps, self._n_refits, self._n_nodes
+            self._on_progress(Progress(self._best_total, *seen, self._best, shape))
 
     def add_refits(self, n_refits: int) -> None:
         """Note refits that are no step of the work, and so nothing to report."""
@@ -147,7 +185,7 @@ class Meter:
         return Stats(self._n_refits, self._seconds(), self.stopped_by)
 
     def _seconds(self) -> float:
-        return time.perf_counter() - self._began
+        return CLOCK.seconds() - self._began
 
 
 class Foresight(Meter):
@@ -159,7 +197,7 @@ class Foresight(Meter):
     def __init__(self, of: Meter) -> None:
         super().__init__(of.rest(), whole=of)
 
-    def count(self, n_refits: int, best_total: float) -> None:
+    def count(self, n_refits: int, best_total: float, shape: Shape | None = None) -> None:
         """Note one step of work, which whoever looks ahead counts, if it was worth a refit."""
         self._n_steps += 1
         self._n_refits += n_refits

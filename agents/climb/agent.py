@@ -51,7 +51,7 @@ class ClimbAgent(WholeAgent):
             if self._config.with_greedy and not meter.spent():
                 solution = BeamAgent(BeamConfig(width=1)).solve(simulator, meter.rest())
                 candidates.append(solution)
-                meter.count(solution.stats.n_refits, solution.score.total)
+                meter.count(solution.stats.n_refits, solution.score.total, lambda: solution.mesh)
                 if solution.stats.stopped_by == "interrupted":
                     raise KeyboardInterrupt
                 found = tops.add_mesh(solution.mesh)
@@ -96,11 +96,11 @@ def climb(hill: Hill, place: Place, config: ClimbConfig, meter: Meter) -> Iterat
             n_fits += len(places)
             best = max(places, key=total_of)
         if best.total <= place.total + LEAST_GAIN:
-            meter.count(n_fits, place.total)
+            meter.count(n_fits, place.total, place.mesh)
             return
         place = best
         yield place
-        meter.count(n_fits, place.total)
+        meter.count(n_fits, place.total, place.mesh)
 
 
 def fitted_neighbours(hill: Hill, place: Place, n_blamed: int, meter: Meter) -> list[Place]:

@@ -81,7 +81,7 @@ class DecimateAgent(WholeAgent):
             places = hill.fit(candidates, LOCAL, place.score.iou)
             place = max(places, key=total_of)
             yield place
-            meter.count(len(places), place.total)
+            meter.count(len(places), place.total, place.mesh)
 
 
 def n_vertices(outline: Outline) -> int:

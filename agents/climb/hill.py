@@ -8,6 +8,7 @@ from agents.trace.outline import Outline
 from agents.trace.reach import Reach
 from agents.trace.rings import trace_rings
 from autopoly_env.compute import map_threads
+from autopoly_env.mesh import PolyMesh
 from autopoly_env.refit import RefitConfig
 from autopoly_env.score import Score
 from autopoly_env.simulator import Simulator
@@ -24,6 +25,10 @@ class Place(NamedTuple):
     @property
     def total(self) -> float:
         return self.score.total
+
+    def mesh(self) -> PolyMesh:
+        """Its rings."""
+        return self.outline.loops
 
 
 class Hill:

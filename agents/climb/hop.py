@@ -58,7 +58,7 @@ def _variant_seeds(hill: Hill, meter: Meter) -> list[Place]:
             if meter.spent() or outline.is_fine:
                 break
             [place] = hill.fit([outline], LOCAL, hill.place(outline).score.iou)
-            meter.count(1, place.total)
+            meter.count(1, place.total, place.mesh)
             sizes = tuple(sorted(len(ring.points) for ring in outline.rings))
             if sizes not in seeds or seeds[sizes].total < place.total:
                 seeds[sizes] = place
@@ -72,7 +72,7 @@ def _hop_from(hill: Hill, top: Place, most_lost: float, rng: np.random.Generator
         return None
     [place] = hill.fit([outline], THOROUGH, top.score.iou)
     meter.add_simulation(1)
-    meter.count(1, place.total)
+    meter.count(1, place.total, place.mesh)
     return _descend(hill, place, meter) if place.total > top.total - most_lost else None
 
 
@@ -81,7 +81,7 @@ def _descend(hill: Hill, place: Place, meter: Meter) -> Place:
     while not meter.spent():
         places = fitted_neighbours(hill, place, _N_BLAMED, meter)
         best = max(places, key=total_of, default=place)
-        meter.count(len(places), best.total)
+        meter.count(len(places), best.total, best.mesh)
         if best.total <= place.total + LEAST_GAIN:
             return place
         place = best

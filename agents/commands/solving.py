@@ -1,7 +1,7 @@
 """The work behind `agents.solve`: one image after the other, each whole or not at all, until done or Ctrl-C."""
 
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from agents.base import Agent
-from agents.budget import Budget
+from agents.budget import Budget, Progress
 from agents.commands import pictures
 from agents.commands.ctrl_c import CtrlC
 from agents.commands.losses import in_words, losses_of
@@ -21,7 +21,9 @@ from agents.commands.wishes import NO_WISHES, Wishes
 from agents.contract import solved
 from agents.entry import AgentEntry
 from agents.registry import find_agent
+from agents.solution import Solution
 from autopoly_env.compute import n_threads
+from autopoly_env.details import Losses
 from autopoly_env.errors import AutoPolyError, ConfigError
 from autopoly_env.export import save_png
 from autopoly_env.files import file_stem
@@ -189,29 +191,52 @@ def _load_kernels(settings: Settings, ctrl_c: CtrlC) -> None:
 
     Whatever goes wrong here will go wrong again, and be reported, with the first image.
     """
+    with suppress(KeyboardInterrupt, Exception), ctrl_c.searching():
+        solve_frame(settings)
+
+
+def solve_frame(settings: Settings) -> None:
+    """Solve a small frame, so that all kernels are there."""
     mask = np.zeros((32, 32), np.bool_)
     mask[6:26, 6:26] = True
     mask[12:20, 12:20] = False
-    with suppress(KeyboardInterrupt, Exception), ctrl_c.searching():
-        solved(settings.new_agent(), settings.simulator(Silhouette(mask)), settings.budget)
+    solved(settings.new_agent(), settings.simulator(Silhouette(mask)), settings.budget)
 
 
 def _solve(job: Job, settings: Settings, out: Path, report: Report, ctrl_c: CtrlC) -> tuple[Result, Silhouette]:
     """Solve an image and write its results."""
     silhouette = load_silhouette(job.image, name=job.name, options=settings.picture)
+    found = solve_picture(silhouette, settings, ctrl_c.heeding(report.progress), ctrl_c.searching)
+    files = write_results(out / job.name, found.solution, silhouette, ctrl_c.shielded, with_mask=settings.show_mask)
+    notes = (*job.notes, *silhouette.notes, *found.notes)
+    return Result(job.image, job.name, found.solution, notes, files, found.losses), silhouette
+
+
+@dataclass(frozen=True)
+class Found:
+    """What came of a picture."""
+
+    solution: Solution  # whose sequence keeps the settings, too
+    losses: Losses
+    notes: tuple[str, ...]  # on the way it was built and what is lost, those on the picture aside
+
+
+def solve_picture(
+    silhouette: Silhouette,
+    settings: Settings,
+    on_progress: Callable[[Progress], None],
+    searching: Callable[[], AbstractContextManager[None]] = nullcontext,
+) -> Found:
+    """Solve a picture as the settings say; the search itself is within `searching()`."""
     simulator, agent = settings.simulator(silhouette), settings.new_agent()
-    with ctrl_c.searching():
-        solution = solved(agent, simulator, settings.budget, ctrl_c.heeding(report.progress))
+    with searching():
+        solution = solved(agent, simulator, settings.budget, on_progress)
     losses = losses_of(solution, simulator)
     lost = in_words(losses, simulator, solution.score.iou)
     own = {**settings.as_dict(), **({"lost": lost} if lost else {})}
-    sequence = solution.sequence
-    sequence = replace(sequence, settings={**sequence.settings, **own})
-    solution = replace(solution, sequence=sequence)
-    files = write_results(out / job.name, solution, silhouette, ctrl_c.shielded, with_mask=settings.show_mask)
-    notes = [*job.notes, *silhouette.notes, *_notes_on_scoring(silhouette)]
-    notes += [*_notes_on_symmetry(settings, simulator), *([lost] if lost else [])]
-    return Result(job.image, job.name, solution, tuple(notes), files, losses), silhouette
+    sequence = replace(solution.sequence, settings={**solution.sequence.settings, **own})
+    notes = [*_notes_on_scoring(silhouette), *_notes_on_symmetry(settings, simulator), *([lost] if lost else [])]
+    return Found(replace(solution, sequence=sequence), losses, tuple(notes))
 
 
 def _notes_on_scoring(silhouette: Silhouette) -> list[str]:

@@ -31,6 +31,10 @@ class QuadPlace(NamedTuple):
     score: Score
     total: float  # r_all, less a little for triangles and what is off in choosing
 
+    def mesh(self) -> PolyMesh:
+        """Its faces; the rings of what cannot be cut."""
+        return self.outline.loops if self.partition is None else mesh_of(self.outline, self.partition)
+
 
 def total_of(place: QuadPlace) -> float:
     return place.total

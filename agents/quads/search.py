@@ -77,7 +77,7 @@ def climbed(hill: QuadHill, place: QuadPlace, meter: Meter) -> QuadPlace:
         for first in range(0, len(outlines), _N_AT_ONCE):
             places = hill.fit(meter.affordable(outlines[first : first + _N_AT_ONCE]), LOCAL, place.score.iou)
             best = max([place, *places], key=total_of)
-            meter.count(len(places), best.total)
+            meter.count(len(places), best.total, best.mesh)
             if best.total > place.total + _LEAST_GAIN or meter.spent():
                 break
         if best.total <= place.total + _LEAST_GAIN:
@@ -92,8 +92,8 @@ def _looked_around(hill: QuadHill, place: QuadPlace, meter: Meter) -> QuadPlace 
     places = hill.fit(outlines, LOCAL, place.score.iou)
     hopeful = sorted(places, key=total_of, reverse=True)[:_N_THOROUGH]
     places += hill.fit([*(p.outline for p in hopeful), place.outline], THOROUGH, place.score.iou)
-    meter.count(len(places), place.total)
     best = max(places, key=total_of)
+    meter.count(len(places), best.total, best.mesh)
     if best.total <= place.total + _LEAST_GAIN:
         return None
     return climbed(hill, best, meter)
@@ -105,7 +105,7 @@ def _hop_from(
     """The top above a shaken outline; None if it has lost too much."""
     [place] = hill.fit([hill.shaken(top, rng)], THOROUGH, top.score.iou)
     meter.add_simulation(1)
-    meter.count(1, place.total)
+    meter.count(1, place.total, place.mesh)
     if place.total <= top.total - most_lost:
         return None
     return climbed(hill, place, meter)
@@ -139,7 +139,11 @@ def _fitted(hill: QuadHill, contours: Iterable[list[Ring]], meter: Meter) -> lis
         outlines = meter.affordable(list(chain.from_iterable(map(hill.symmetric, swept))))
         iou = max((hill.place(outline).score.iou for outline in outlines), default=1.0)
         places += hill.fit(outlines, LOCAL, iou)
-        meter.count(len(outlines), max(map(total_of, places), default=float("-inf")))
+        best = max(places, key=total_of, default=None)
+        if best is None:
+            meter.count(len(outlines), float("-inf"))
+        else:
+            meter.count(len(outlines), best.total, best.mesh)
     return places
 
 

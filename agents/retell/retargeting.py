@@ -207,13 +207,13 @@ def improve(simulator: Simulator, version: Version, meter: Meter) -> Iterator[Ve
         for part in (hopeful[:_N_TRIED], hopeful[_N_TRIED:]):
             if better is None and not meter.spent():
                 fitted = _refitted(simulator, part[: meter.rest().refits], LOCAL)
-                meter.count(len(fitted), version.total)
+                meter.count(len(fitted), version.total, version.shape)
                 better = first_settled(simulator, _above(fitted, version))
                 found += fitted
         if better is None and not meter.spent():
             best = sorted(found, key=total_of, reverse=True)[:_N_THOROUGH]
             harder = _refitted(simulator, [version, *best][: meter.rest().refits], THOROUGH)
-            meter.count(len(harder), version.total)
+            meter.count(len(harder), version.total, version.shape)
             better = first_settled(simulator, _above(harder, version))
         if better is not None:
             yield better

@@ -36,6 +36,10 @@ class Version:
     def total(self) -> float:
         return self.score.total
 
+    def shape(self) -> PolyMesh:
+        """`mesh`, as budgets show what was found."""
+        return self.mesh
+
     @cached_property
     def sequence(self) -> ConstructionSequence:
         """The steps, not scored."""

@@ -42,7 +42,7 @@ def _solve_within(agent: Agent, simulator: Simulator, meter: Meter, budget: Budg
     def report(progress: Progress) -> None:
         nonlocal n_counted
         n_new, n_counted = progress.n_refits - n_counted, progress.n_refits
-        meter.count(n_new, progress.best_total)
+        meter.count(n_new, progress.best_total, progress.best)
 
     solution = solved(agent, simulator, replace(budget, simulations=None), report)
     meter.add_refits(solution.stats.n_refits - n_counted)

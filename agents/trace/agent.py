@@ -80,7 +80,8 @@ class TraceAgent(WholeAgent):
             configs = () if k in rough else (LOCAL,) if outline.is_fine else _REFITS
             target = simulator.refit_target(outline.score(pixels, simulator.weights).iou)
             found = [*(outline.refitted(target, config) for config in configs), outline]
-            meter.count(len(configs), max(final_total(simulator, o) for o in found))
+            totals = [final_total(simulator, one) for one in found]
+            meter.count(len(configs), max(totals), found[totals.index(max(totals))].shape)
             yield from found
 
     def sweep(self, simulator: Simulator, rings: Sequence[Ring], reach: Reach | None = None) -> Iterator[Outline]:

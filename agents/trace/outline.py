@@ -31,6 +31,10 @@ class Outline:
         points = np.concatenate([ring.points for ring in self.rings])
         return PolyMesh(points, cycles, tuple(range(n)), tuple(range(f)), n, f)
 
+    def shape(self) -> PolyMesh:
+        """`loops`, as budgets show what was found."""
+        return self.loops
+
     @cached_property
     def n_vertices(self) -> int:
         return sum(len(ring.points) for ring in self.rings)
