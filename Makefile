@@ -6,7 +6,7 @@ PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses=2
 INSTALL := $(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test quick lint format check bench extension clean
+.PHONY: help demo studio test quick lint format check bench extension clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -14,6 +14,9 @@ help: ## this list
 demo: .venv/installed-base ## build a mesh of every silhouette in examples/ and draw how it came about
 	@$(BIN)/python -m agents.solve examples --out out
 	@echo "The pictures are in out/: open the one named last above."
+
+studio: .venv/installed-studio ## open the studio in the browser: drop a picture, watch its mesh come about
+	@$(BIN)/python -m agents.studio
 
 test: .venv/installed-dev ## run the tests, all of them
 	@$(PYTEST)

@@ -17,8 +17,6 @@ from autopoly_env.errors import ConfigError, SequenceError
 if TYPE_CHECKING:
     from agents.retell.retargeting import Retargeted
     from autopoly_env.sequence import ConstructionSequence
-    from autopoly_env.silhouette import Silhouette
-    from autopoly_env.simulator import Simulator
 
 STOPPED = "stopped by Ctrl-C; the files that were written are whole"
 
@@ -74,7 +72,7 @@ def retarget(
     from agents.commands.results import Result, claim_folder, write_results
     from agents.commands.solving import name_jobs
     from agents.retell.retargeting import retarget as work
-    from autopoly_env.mesh.symmetry import axis_of
+    from agents.retell.retargeting import simulator_of
     from autopoly_env.sequence import ConstructionSequence
     from autopoly_env.silhouette import load_silhouette
 
@@ -84,8 +82,10 @@ def retarget(
     sequence = _under(source, ConstructionSequence.load(source), faces)
     [job] = name_jobs([image], out)
     silhouette = load_silhouette(image, name=job.name, options=picture)
-    is_alike = not no_symmetry and axis_of(sequence.final()) is not None
-    simulator = _simulator(source, sequence, silhouette, "auto" if is_alike else None)
+    try:
+        simulator = simulator_of(sequence, silhouette, keeps_symmetry=not no_symmetry)
+    except ConfigError as error:
+        raise SequenceError(f"{source}: settings: {error}") from None
     _check_not_overwritten(source, out / job.name)
     claim_folder(out)
     with CtrlC() as ctrl_c, Report(1, quiet=quiet or as_json) as report:
@@ -93,9 +93,9 @@ def retarget(
         try:
             with ctrl_c.searching():
                 done = work(simulator, sequence, budget, ctrl_c.heeding(report.progress), keep_level=keep_level)
-            told = replace(done.solution.sequence, settings={**done.solution.sequence.settings, **_notes_of(done)})
+            told = done.told
             solution = replace(done.solution, sequence=told)
-            files = write_results(out / job.name, solution, silhouette, ctrl_c.shielded, with_mask=show_mask)
+            files = write_results(out / job.name, told, silhouette, ctrl_c.shielded, with_mask=show_mask)
         except KeyboardInterrupt:
             return INTERRUPTED
         if as_json:
@@ -120,41 +120,14 @@ def _under(source: Path, sequence: "ConstructionSequence", faces: str | None) ->
         raise SequenceError(f"{source}: {error}") from None
 
 
-def _simulator(
-    source: Path, sequence: "ConstructionSequence", silhouette: "Silhouette", symmetry: str | None
-) -> "Simulator":
-    """The rules that the sequence was made under, as far as it tells them. Raises SequenceError for unknown ones."""
-    from autopoly_env.sequence.variation import weights_of
-    from autopoly_env.simulator import Simulator
-
-    operators, resolution = sequence.settings.get("operators", "full"), sequence.settings.get("resolution", 128)
-    try:
-        return Simulator(
-            silhouette,
-            operators=str(operators),
-            resolution=resolution if isinstance(resolution, int) else 128,
-            weights=weights_of(sequence.settings),
-            max_steps=max(100, len(sequence.steps)),
-            faces=sequence.faces,
-            symmetry=symmetry,
-        )
-    except ConfigError as error:
-        raise SequenceError(f"{source}: settings: {error}") from None
-
-
 def _check_not_overwritten(source: Path, folder: Path) -> None:
     if source.resolve() == (folder / "sequence.json").resolve():
         raise ConfigError(f"the results would overwrite {source}; give another folder with --out")
 
 
-def _notes_of(done: "Retargeted") -> dict[str, Any]:
-    """What a construction sequence keeps beside the simulator's settings."""
-    return {"agent": "retarget", "kept": done.n_kept, "dropped": done.n_dropped, "added": done.n_added}
-
-
 def _record(done: "Retargeted") -> dict[str, Any]:
     return {
-        **_notes_of(done),
+        **done.notes,
         "before": asdict(done.before),
         "refitted": asdict(done.refitted),
         "after": asdict(done.solution.score),

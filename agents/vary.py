@@ -113,15 +113,10 @@ def _check(n: int, amount: float, seed: int) -> None:
 def _write(variant: "Variant", folder: Path, ctrl_c: "CtrlC") -> None:
     """Write what `agents.solve` writes, the variant's own last mesh for its target."""
     from agents.commands.results import write_results
-    from agents.solution import Solution, Stats
-    from autopoly_env.score import Score
     from autopoly_env.sequence.variation import picture_of
 
-    sequence, mesh = variant.sequence, variant.sequence.final()
-    told = sequence.steps[-1].score if sequence.steps else sequence.start_score
-    score = Score(told["iou"], int(told["complexity"]), int(told["self_intersections"]), told["total"])
-    solution = Solution(sequence, mesh, score, Stats(0, 0.0, "finished"))
-    write_results(folder, solution, picture_of(mesh, folder.name), ctrl_c.shielded)
+    sequence = variant.sequence
+    write_results(folder, sequence, picture_of(sequence.final(), folder.name), ctrl_c.shielded)
 
 
 def _cell(mesh: "PolyMesh", caption: str) -> "ByteArray":

@@ -23,7 +23,7 @@ TABLES = {
         parallel: processes, Ray | options: settings
     """,
     "agents": """
-        solve | vary | retarget | export
+        solve | vary | retarget | export | studio: a page in the browser, its server, its workers
         commands: what commands share: progress, results, Ctrl-C, wishes
         registry: agents by name; from outside by my.module:Agent
         guided: nFAP-Net and WarpNet in the search | rl: policies: observation, network, environments

@@ -24,6 +24,7 @@ from autopoly_env.details import Losses
 from autopoly_env.errors import AutoPolyError, OutputError
 from autopoly_env.export import contact_sheet, save_html, save_png, to_obj, to_svg
 from autopoly_env.export.coach import save_lesson
+from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.shown import told
 from autopoly_env.silhouette import Silhouette, thumbnail
 
@@ -66,7 +67,7 @@ def claim_folder(folder: Path) -> None:
 
 def write_results(
     folder: Path,
-    solution: Solution,
+    sequence: ConstructionSequence,
     silhouette: Silhouette,
     shielded: Callable[[], AbstractContextManager[None]],
     *,
@@ -83,12 +84,12 @@ def write_results(
             raise OutputError(f"cannot write {in_the_way} (a folder is in its place); move that away")
         staging = Path(tempfile.mkdtemp(prefix=f"{_STAGING}{_MACHINE}{os.getpid()}-", suffix=".tmp", dir=folder.parent))
         try:
-            solution.sequence.save(staging / "sequence.json")
-            (staging / "mesh.obj").write_text(to_obj(solution.mesh), encoding="utf-8")
-            (staging / "mesh.svg").write_text(to_svg(solution.mesh, target=silhouette), encoding="utf-8")
-            save_png(contact_sheet(solution.sequence, silhouette), staging / "steps.png")
-            save_html(solution.sequence, staging / "player.html", silhouette)
-            save_lesson(solution.sequence, staging / "lesson.json", silhouette)
+            sequence.save(staging / "sequence.json")
+            (staging / "mesh.obj").write_text(to_obj(sequence.final()), encoding="utf-8")
+            (staging / "mesh.svg").write_text(to_svg(sequence.final(), target=silhouette), encoding="utf-8")
+            save_png(contact_sheet(sequence, silhouette), staging / "steps.png")
+            save_html(sequence, staging / "player.html", silhouette)
+            save_lesson(sequence, staging / "lesson.json", silhouette)
             if with_mask:
                 save_mask(silhouette, staging / MASK)
             with shielded():

@@ -207,7 +207,9 @@ def _solve(job: Job, settings: Settings, out: Path, report: Report, ctrl_c: Ctrl
     """Solve an image and write its results."""
     silhouette = load_silhouette(job.image, name=job.name, options=settings.picture)
     found = solve_picture(silhouette, settings, ctrl_c.heeding(report.progress), ctrl_c.searching)
-    files = write_results(out / job.name, found.solution, silhouette, ctrl_c.shielded, with_mask=settings.show_mask)
+    files = write_results(
+        out / job.name, found.solution.sequence, silhouette, ctrl_c.shielded, with_mask=settings.show_mask
+    )
     notes = (*job.notes, *silhouette.notes, *found.notes)
     return Result(job.image, job.name, found.solution, notes, files, found.losses), silhouette
 

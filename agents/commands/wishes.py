@@ -1,6 +1,7 @@
 """What `agents.solve` is told of the way to build: its files are read, and its words understood, before the work."""
 
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -51,10 +52,22 @@ def read_wishes(
     levels = None if importance is None else read_importance(importance)
     mesh = None if start is None else _read_start(start)
     files = {"importance": importance, "start": start}
+    named = {name: str(path) for name, path in files.items() if path}
+    return replace(read_words(_ids(lock), symmetry, keep, align, levels, mesh), files=named)
+
+
+def read_words(
+    locked: Iterable[int] | None,
+    symmetry: str | None,
+    keep: str | None = None,
+    align: bool = False,
+    importance: FloatArray | None = None,
+    start: PolyMesh | ConstructionSequence | None = None,
+) -> Wishes:
+    """The wishes of one whose files have been read. Raises ConfigError that names the option that is wrong."""
     if keep is not None and keep not in KEPT:
         raise ConfigError(f"--keep {keep}: expected one of {', '.join(KEPT)}")
-    named = {name: str(path) for name, path in files.items() if path}
-    return Wishes(levels, mesh, _ids(lock), _axis(symmetry), keep, align, named)
+    return Wishes(importance, start, tuple(locked or ()), _axis(symmetry), keep, align)
 
 
 def _read_start(path: Path) -> PolyMesh | ConstructionSequence:

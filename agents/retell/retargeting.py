@@ -8,6 +8,7 @@ one step longer, refitted, the best is taken while it is better.
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +30,8 @@ from autopoly_env.refit import FROM_AFAR, LOCAL, THOROUGH, RefitConfig, mended, 
 from autopoly_env.score import Score
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence.follower import Follower, Taken
-from autopoly_env.sequence.variation import stay
+from autopoly_env.sequence.variation import stay, weights_of
+from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator
 
 _N_TRIED = 10  # neighbours that are refitted, those that are best as they are
@@ -57,9 +59,38 @@ class Retargeted:
     n_tilted: int  # edges that were and are not
 
     @property
+    def notes(self) -> dict[str, Any]:
+        """What a construction sequence keeps beside the simulator's settings."""
+        return {"agent": "retarget", "kept": self.n_kept, "dropped": self.n_dropped, "added": self.n_added}
+
+    @property
+    def told(self) -> ConstructionSequence:
+        """The sequence, with the notes among its settings."""
+        sequence = self.solution.sequence
+        return replace(sequence, settings={**sequence.settings, **self.notes})
+
+    @property
     def begins_elsewhere(self) -> bool:
         """Whether the start, which was a body once, is a detail of the new shape."""
         return self.start_iou < self.least_start_iou
+
+
+def simulator_of(sequence: ConstructionSequence, silhouette: Silhouette, *, keeps_symmetry: bool = True) -> Simulator:
+    """The rules that the sequence was made under, as far as it tells them. Raises ConfigError for unknown ones.
+
+    Where its last mesh is symmetric, `keeps_symmetry` asks for the same where the new target has an axis.
+    """
+    operators, resolution = sequence.settings.get("operators", "full"), sequence.settings.get("resolution", 128)
+    is_alike = keeps_symmetry and axis_of(sequence.final()) is not None
+    return Simulator(
+        silhouette,
+        operators=str(operators),
+        resolution=resolution if isinstance(resolution, int) else 128,
+        weights=weights_of(sequence.settings),
+        max_steps=max(100, len(sequence.steps)),
+        faces=sequence.faces,
+        symmetry="auto" if is_alike else None,
+    )
 
 
 def retarget(

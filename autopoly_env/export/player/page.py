@@ -35,6 +35,7 @@ DIGITS = 5  # of a coordinate: a hundredth of a pixel on a screen
 MOVED = 0.002  # unit square; a vertex that moves less is not shown as moved
 FARTHEST = 10.0  # unit square; what lies farther out is not brought into view
 TARGET_SIZE = 768  # pixels a side of the target in the page, at most
+LOOK, WORK = ("look.css", "player.css"), ("drawing.js", "player.js")  # the first of each is the studio's as well
 MARKED_CHARACTERS = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026", "\u2028": "\\u2028", "\u2029": "\\u2029"}
 
 
@@ -44,7 +45,7 @@ def to_html(sequence: ConstructionSequence, target: Silhouette | None = None) ->
     Raises SequenceError if the replay fails.
     """
     title = _title(sequence, target)
-    style, script = _part("player.css"), _part("player.js")
+    style, script = (part_of(shared) + part_of(own) for shared, own in (LOOK, WORK))
     parts = {
         "title": html.escape(title),
         "policy": f"default-src 'none'; img-src data:; style-src '{_digest(style)}'; script-src '{_digest(script)}'",
@@ -53,7 +54,7 @@ def to_html(sequence: ConstructionSequence, target: Silhouette | None = None) ->
         "data": _script_json(_page_data(sequence, target, title)),
     }
     # in one pass over the template, so that nothing inside the parts is taken for a mark
-    return re.sub(r"\{\{(\w+)\}\}", lambda mark: parts[mark[1]], _part("player.html"))
+    return re.sub(r"\{\{(\w+)\}\}", lambda mark: parts[mark[1]], part_of("player.html"))
 
 
 def save_html(sequence: ConstructionSequence, path: str | os.PathLike[str], target: Silhouette | None = None) -> Path:
@@ -71,7 +72,8 @@ def to_frame(sequence: ConstructionSequence, height: int = 620) -> str:
 
 
 @cache
-def _part(name: str) -> str:
+def part_of(name: str) -> str:
+    """A file of the page, as text."""
     return (files(__package__) / name).read_text(encoding="utf-8")
 
 

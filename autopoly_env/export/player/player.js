@@ -1,17 +1,15 @@
 
 // The player. Time runs from 0, the start, to the number of steps: step k lasts from k - 1 to k. In the first part of
 // it the mesh is still as before, with what to click marked, then the operator works, and in the rest the vertices move.
-"use strict";
 (() => {
+  const { SCALE, VERTEX_PX, CURVE_INSET, byId, set, clamp, make, edgesOf, elementsOf, place, curve } = Drawing;
   const STEP_MS = 1300, HOLD_MS = 900; // a step's motion, and the rest after it when playing
   const SKIP_MS = 90, LONGEST_MS = 2600; // a further step when several are passed, and all of them together
   const PICK_SHARE = 0.3, OPERATOR_SHARE = 0.55; // of a step: until the operator works, and until it has
   const NAME_PX = 12.5, NAME_GAP_PX = 11, PRINTED_PX = 210; // a name, how far from its vertex; the width of a printed mesh
-  const SCALE = 1000, MARGIN = 0.07; // drawing units a unit square; of the box that is shown
-  const VERTEX_PX = 3.6, CHANGED_PX = 4.8, HIT_PX = 11;
-  const CURVE_INSET = 9, CURVE_TOP = 16, CURVE_BOTTOM = 6; // pixels; the inset is half a slider's thumb
+  const GROUPS = { vertex: "vertices", edge: "edges", face: "faces" };
+  const MARGIN = 0.07, CHANGED_PX = 4.8; // of the box that is shown; a vertex that is new or has moved
 
-  const byId = id => document.getElementById(id);
   const data = JSON.parse(byId("data").textContent), steps = data.steps, last = steps.length - 1;
   const stage = byId("stage"), mesh = byId("mesh"), slider = byId("step"), tag = byId("tag");
   const still = matchMedia("(prefers-reduced-motion: reduce)");
@@ -20,26 +18,12 @@
   let built = "", elements = [], named = null, unit = 1, speed = 1;
   let isBefore = false, isHidden = false; // the mesh before the step is asked for; the step is to be guessed
 
-  function make(kind, attributes = {}, ...children) {
-    const isDrawn = ["g", "path", "line", "circle", "text", "mask", "image", "rect", "title"].includes(kind);
-    const element = isDrawn ? document.createElementNS("http://www.w3.org/2000/svg", kind) : document.createElement(kind);
-    for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
-    element.append(...children);
-    return element;
-  }
-  const set = (element, attributes) => { for (const name in attributes) element.setAttribute(name, attributes[name]); };
   const ease = t => t * t * (3 - 2 * t);
-  const clamp = (value, low, high) => Math.min(high, Math.max(low, value));
   const between = (a, b, t) => [a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t];
 
   // What a step's mesh consists of.
   for (const step of steps) {
-    step.edges = {};
-    for (const face of Object.values(step.faces))
-      face.forEach((a, i) => {
-        const b = face[(i + 1) % face.length];
-        step.edges[`${Math.min(a, b)}–${Math.max(a, b)}`] = [Math.min(a, b), Math.max(a, b)];
-      });
+    step.edges = edgesOf(step.faces);
     Object.assign(step, { put: {}, lost: {}, moved: [], takes: null, ...step });
     step.picks = new Set(step.picks);
   }
@@ -52,23 +36,15 @@
     if (key === built) return;
     built = key;
     const hadFocus = mesh.contains(document.activeElement);
-    const { vertices, edges, faces } = steps[topology], before = steps[Math.max(k - 1, 0)], after = steps[k];
-    elements = [];
-    const add = (kind, id, group, points, ...children) => {
-      const element = make("g", { class: kind, tabindex: -1, role: "img", "aria-label": `${kind} ${id}` }, ...children);
-      const isNew = !(id in before[group]), goes = !(id in after[group]);
-      element.classList.toggle("new", isNew);
+    const before = steps[Math.max(k - 1, 0)], after = steps[k];
+    elements = elementsOf(steps[topology]);
+    for (const item of elements) {
+      const { kind, id, element, name } = item, group = GROUPS[kind];
+      Object.assign(item, { isNew: !(id in before[group]), goes: !(id in after[group]) });
+      element.classList.toggle("new", item.isNew);
       element.classList.toggle("moved", kind === "vertex" && !isPicking && after.moved.includes(+id));
-      element.classList.toggle("pick", isPicking && after.picks.has(`${kind} ${id}`));
-      elements.push({ name: `${kind} ${id}`, kind, element, points, isNew, goes });
-      return element;
-    };
-    byId("vertices").replaceChildren(...Object.keys(vertices).map(id =>
-      add("vertex", id, "vertices", [id], make("circle", { class: "hit" }), make("circle", { class: "seen" }))));
-    byId("edges").replaceChildren(...Object.entries(edges).map(([id, ends]) =>
-      add("edge", id, "edges", ends, make("line", { class: "hit" }), make("line", { class: "seen" }))));
-    byId("faces").replaceChildren(...Object.entries(faces).map(([id, corners]) =>
-      add("face", id, "faces", corners, make("path", { class: "seen" }))));
+      element.classList.toggle("pick", isPicking && after.picks.has(name));
+    }
     byId("names").replaceChildren(...elements.filter(item => isTold(item, k, isPicking)).map(item => {
       const id = item.name.split(" ")[1];
       return make("text", { "data-name": item.name }, item.kind === "face" ? item.name : id);
@@ -121,20 +97,12 @@
       const start = isPicking ? old : put ? between(put, put.slice(2), appear) : lost ? between(old, lost, appear) : old;
       return (now && !isPicking ? between(start, now, settle) : start).map(value => value * SCALE);
     };
-    for (const { kind, element, points, isNew, goes } of elements) {
-      const places = points.map(at);
+    for (const item of elements) {
+      const { kind, element, points, isNew, goes } = item;
       const fades = goes && (step.takes === "all" || step.takes === kind);
       if (kind === "face") element.style.setProperty("--new", `${100 * appear}%`);
       element.style.opacity = fades ? 1 - appear : isNew && kind !== "face" ? appear : 1;
-      if (kind === "face") element.firstChild.setAttribute("d", `M${places.join("L")}Z`);
-      else if (kind === "edge")
-        for (const line of element.children)
-          set(line, { x1: places[0][0], y1: places[0][1], x2: places[1][0], y2: places[1][1] });
-      else {
-        const isChanged = isNew || element.classList.contains("moved");
-        set(element.firstChild, { cx: places[0][0], cy: places[0][1], r: HIT_PX * unit });
-        set(element.lastChild, { cx: places[0][0], cy: places[0][1], r: (isChanged ? CHANGED_PX : VERTEX_PX) * unit });
-      }
+      place(item, points.map(at), unit, isNew || element.classList.contains("moved") ? CHANGED_PX : VERTEX_PX);
     }
     for (const line of byId("trails").children) {
       const [x1, y1] = before.vertices[line.dataset.id].map(value => value * SCALE), [x2, y2] = at(line.dataset.id);
@@ -182,14 +150,6 @@
     tag.hidden = true;
   }
 
-  function walk(change) {
-    const i = elements.findIndex(item => item.element === document.activeElement);
-    const item = elements[(i + change + elements.length) % elements.length];
-    for (const other of elements) other.element.setAttribute("tabindex", -1);
-    item.element.setAttribute("tabindex", 0);
-    item.element.focus({ preventScroll: true });
-  }
-
   mesh.addEventListener("pointerover", event => { const item = itemOf(event.target); item ? showTag(item.name) : hideTag(); });
   mesh.addEventListener("pointerleave", () => hideTag());
   // On the HTML around it: an SVG element that listens for focus becomes a stop of the tab key itself.
@@ -198,30 +158,15 @@
   mesh.addEventListener("keydown", event => {
     const change = { ArrowDown: 1, ArrowUp: -1 }[event.key];
     if (!change) return;
-    walk(change);
+    Drawing.walk(elements, change);
     event.preventDefault();
   });
 
   // --- The score curve ---
 
-  const curveX = k => CURVE_INSET + (byId("curve").clientWidth - 2 * CURVE_INSET) * (last ? k / last : 0);
-
   function drawCurve() {
-    const totals = steps.map(step => step.total), low = Math.min(...totals), high = Math.max(...totals);
-    const bottom = byId("curve").clientHeight - CURVE_BOTTOM;
-    const points = totals.map((total, k) => [curveX(k), bottom - (bottom - CURVE_TOP) * (high > low ? (total - low) / (high - low) : 0.5)]);
-    const now = Math.round(goal), best = totals.indexOf(high), path = list => list.length ? `M${list.join("L")}` : "";
-    set(byId("area"), { d: `${path(points)}L${[curveX(last), bottom + CURVE_BOTTOM]}L${[curveX(0), bottom + CURVE_BOTTOM]}Z` });
-    set(byId("behind"), { d: path(points.slice(0, now + 1)) });
-    set(byId("ahead"), { d: path(points.slice(now)) });
-    const small = last > 60 ? 0 : 2.4;
-    byId("dots").replaceChildren(...points.map(([cx, cy], k) => {
-      const title = make("title", {}, `step ${k}: ${totals[k].toFixed(2)}`);
-      const kind = k === now ? "current" : k < now ? "past" : "ahead";
-      return make("circle", { cx, cy, r: k === now ? 6 : small, class: kind }, title);
-    }));
-    const anchor = best > 0.85 * last ? "end" : best < 0.15 * last ? "start" : "middle";
-    byId("dots").append(make("text", { x: points[best][0], y: points[best][1] - 10, "text-anchor": anchor }, `best ${high.toFixed(2)}`));
+    const totals = steps.map(step => step.total), now = Math.round(goal), high = Math.max(...totals);
+    const best = curve(totals.map((_, k) => (last ? k / last : 0)), totals, now, k => `step ${k}: ${totals[k].toFixed(2)}`);
     byId("curve").setAttribute("aria-label", `Score r_all by step: ${totals[0].toFixed(2)} at the start, best ${high.toFixed(2)} at step ${best}, ${totals[last].toFixed(2)} at the end`);
   }
 

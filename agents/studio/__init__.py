@@ -1,0 +1,1 @@
+"""The studio: a page in the browser that shows a search at work, and the local server behind it."""
