@@ -21,6 +21,7 @@ from agents.options import validated
 from agents.studio import by_hand, edits, taking, uploads
 from agents.studio.choices import Choices
 from agents.studio.items import Item
+from agents.studio.masks import plain_mask
 from agents.studio.painting import SIDE, check_painted
 from agents.studio.studio import CREW, LIST, NoItemError, Studio
 from autopoly_env.errors import AutoPolyError, ConfigError
@@ -140,6 +141,8 @@ class _Pages:
         self._studio.check_room(len(data))
         found = await asyncio.to_thread(uploads.opened, name, data)
         self._studio.check_room(len(data))
+        found = self._studio.named(found)
+        await asyncio.to_thread(plain_mask, found.silhouette)
         item = self._studio.add(found, waits=waits)
         return JSONResponse({"id": item.id, "name": item.name})
 
@@ -176,6 +179,7 @@ class _Pages:
     async def _object(self, item: Item, request: Request) -> None:
         options = validated(ObjectOptions, await _json(request), "")
         found = await asyncio.to_thread(by_hand.look_again, item, options)
+        await asyncio.to_thread(plain_mask, found.silhouette)
         item.is_front = True
         self._studio.with_object(item, options, found)
 
@@ -218,12 +222,12 @@ class _Pages:
                 places = {vertex: (float(x), float(y))}
                 sequence, moved = await asyncio.to_thread(by_hand.pull, item, places)
                 self._studio.edited(item, sequence, f"vertex {vertex} pulled by hand", moved)
-            case {"do": str(operator), "element": dict(element)} if operator in edits.OPERATORS:
-                choice = asked.get("choice")
-                sequence = await asyncio.to_thread(by_hand.change, item, operator, element, choice)
-                self._studio.edited(item, sequence, f"{operator.replace('_', ' ')} by hand")
+            case {"do": operator, **rest} if operator != "pull":
+                step = validated(edits.Asked, {"operator": operator, **rest}, "edit: ")
+                sequence = await asyncio.to_thread(by_hand.change, item, step)
+                self._studio.edited(item, sequence, f"{step.operator.replace('_', ' ')} by hand")
             case _:
-                raise ConfigError("edit: expected undo, redo, pull, or an operator with its element")
+                raise ConfigError("edit: expected undo, redo, a vertex to pull, or an operator with its element")
 
     async def _retell(self, item: Item, request: Request) -> None:
         given = (await _json(request)).get("from")

@@ -1,7 +1,5 @@
 """What a hand does to an item: pulls, steps of its own, other options for the picture. Nothing is changed here."""
 
-from typing import Any
-
 from agents.studio import edits
 from agents.studio.items import Item
 from agents.studio.uploads import Opened, reopened
@@ -17,9 +15,9 @@ def pull(item: Item, places: dict[int, tuple[float, float]]) -> tuple[Constructi
     return edits.pulled(sequence, both, item.scored), tuple(both)
 
 
-def change(item: Item, operator: str, element: dict[str, Any], choice: dict[str, Any] | None) -> ConstructionSequence:
+def change(item: Item, asked: edits.Asked) -> ConstructionSequence:
     """The version that is looked at with one step more."""
-    return edits.done(_looked_at(item), operator, element, choice, item.scored)
+    return edits.done(_looked_at(item), asked, item.scored)
 
 
 def _looked_at(item: Item) -> ConstructionSequence:

@@ -4,8 +4,8 @@ A vertex that is pulled is a move of the last step (of the start, where there is
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -14,9 +14,8 @@ from autopoly_env.mesh import PolyMesh, broken_faces, defects_of, images_of
 from autopoly_env.operators import Action
 from autopoly_env.score import Score
 from autopoly_env.sequence import ConstructionSequence, Step
+from autopoly_env.sequence.file import Id
 from autopoly_env.sequence.ids import decoded
-
-OPERATORS = ("face_delete", "face_split", "edge_subdivide", "edge_extrude", "vertex_dissolve", "edge_dissolve")
 
 Scored = Callable[[PolyMesh], Score]
 Places = Mapping[int, tuple[float, float]]  # by vertex id, in the unit square
@@ -40,20 +39,20 @@ def pulled(sequence: ConstructionSequence, places: Places, scored: Scored) -> Co
     return replace(sequence, steps=(*before, told))
 
 
-def done(
-    sequence: ConstructionSequence,
-    operator: str,
-    element: dict[str, Any],
-    choice: dict[str, Any] | None,
-    scored: Scored,
-) -> ConstructionSequence:
-    """The construction with one step more. Raises ConfigError, or what the operator says, where it cannot be."""
-    if operator not in OPERATORS:
-        raise ConfigError(f"operator {operator!r}: expected one of {', '.join(OPERATORS)}")
-    mesh = sequence.final()
-    asked = Step(operator, element, choice, {}, {}, (), {})
-    found, index, chosen = decoded(mesh, asked)
-    made = _sound(found.apply(mesh, index, chosen if choice is not None else None))
+@dataclass(frozen=True)
+class Asked:
+    """A step that is asked for: elements and what is left to choose by ids, as a sequence names them."""
+
+    operator: Literal["face_delete", "face_split", "edge_subdivide", "edge_extrude", "vertex_dissolve", "edge_dissolve"]
+    element: dict[str, Id | list[Id]]
+    choice: dict[str, Id] | None = None
+
+
+def done(sequence: ConstructionSequence, asked: Asked, scored: Scored) -> ConstructionSequence:
+    """The construction with one step more. Raises AutoPolyError, in the operator's words, where it cannot be."""
+    mesh, operator = sequence.final(), asked.operator
+    found, index, chosen = decoded(mesh, Step(operator, asked.element, asked.choice, {}, {}, (), {}))
+    made = _sound(found.apply(mesh, index, chosen))
     sequence = _ruled(sequence, made)
     step = ConstructionSequence.record(
         {}, mesh, scored(mesh).as_dict(), [(Action(operator, index), chosen, made, scored(made).as_dict())]

@@ -1,23 +1,19 @@
 """`Item`: a picture in the studio, with all that was chosen, wished for and found. It lives in the server's memory."""
 
-import base64
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 from agents.commands import pictures
 from agents.studio.choices import Choices, Task, as_plain
-from agents.studio.painting import levels_of
+from agents.studio.masks import painted_target, plain_mask
 from agents.studio.shapes import plain_mesh
 from agents.studio.uploads import Opened
-from autopoly_env.export.pictures import picture_url
-from autopoly_env.guidance import best_axis, weighted
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.score import Score, ScoreWeights, score
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import DEFAULT_OPTIONS, ObjectOptions, Silhouette
 
-TARGET_SIZE = 768  # pixels a side of the mask on the page, at most
 MOST_VERSIONS = 60  # that undo goes back
 
 WAITING, SEARCHING, PAUSED, DONE, FAILED, IDLE = "waiting", "searching", "paused", "done", "failed", "idle"
@@ -62,9 +58,9 @@ class Item:
     wish_number: int = 0  # counts the changes of what is searched for: news of older ones are no news
 
     @classmethod
-    def of(cls, number: int, name: str, found: Opened) -> "Item":
+    def of(cls, number: int, found: Opened) -> "Item":
         """An item of a file that was read."""
-        item = cls(number, name, found.picture, found.options, found.silhouette, found.problem)
+        item = cls(number, found.name, found.picture, found.options, found.silhouette, found.problem)
         item.shown, item.small = found.shown, found.small
         if found.shared is not None:
             item.choices, item.painted = found.shared.choices, found.shared.painted
@@ -96,7 +92,7 @@ class Item:
     def target(self) -> Silhouette:
         """The silhouette with what matters in it."""
         assert self.silhouette is not None
-        return self.silhouette if self.painted is None else weighted(self.silhouette, levels_of(self.painted))
+        return painted_target(self.silhouette, self.painted)
 
     def scored(self, mesh: PolyMesh) -> Score:
         """What a mesh is worth here."""
@@ -129,7 +125,7 @@ class Item:
             "object": self.options.__dict__ | {},
             "given_object": pictures.as_dict(self.options),
             "notes": [] if self.silhouette is None else list(self.silhouette.notes),
-            **self._plain_mask(),
+            **plain_mask(self.silhouette),
             "choices": as_plain(self.choices),
             "is_painted": self.painted is not None,
             "locked": list(self.locked),
@@ -137,18 +133,6 @@ class Item:
             "n_undo": max(0, self.at),
             "n_redo": len(self.versions) - 1 - self.at,
             "version": self._plain_version(),
-        }
-
-    def _plain_mask(self) -> dict[str, Any]:
-        if self.silhouette is None:
-            return {"target": None, "frame": [0, 0, 1, 1], "share": 0.0, "best_axis": 0.5}
-        size = self.silhouette.resolution
-        height, width = self.silhouette.picture_shape or (size, size)
-        return {
-            "target": picture_url(self.silhouette, (255, 255, 255), TARGET_SIZE),
-            "frame": [(size - width) // 2 / size, (size - height) // 2 / size, width / size, height / size],
-            "share": round(float(self.silhouette.mask.mean()), 4),
-            "best_axis": round(best_axis(self.silhouette), 4),
         }
 
     def _plain_version(self) -> dict[str, Any] | None:
@@ -172,13 +156,3 @@ class Item:
 
 def _scores(sequence: ConstructionSequence) -> Sequence[dict[str, Any]]:
     return [sequence.start_score, *(step.score for step in sequence.steps)]
-
-
-def data_url(png: bytes) -> str:
-    """A picture as a page has it inside itself."""
-    return f"data:image/png;base64,{base64.b64encode(png).decode('ascii')}"
-
-
-def renamed(silhouette: Silhouette, name: str) -> Silhouette:
-    """The same silhouette under another name."""
-    return replace(silhouette, name=name)

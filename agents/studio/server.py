@@ -104,7 +104,7 @@ async def _open(studio: Studio, path: Path, *, waits: bool) -> None:
             data = await asyncio.to_thread(_read, path)
         except OSError as error:
             raise ConfigError(f"{path}: cannot be read ({error.strerror})") from None
-        studio.add(await asyncio.to_thread(opened, stem_of(path.name), data), waits=waits)
+        studio.add(studio.named(await asyncio.to_thread(opened, stem_of(path.name), data)), waits=waits)
     except AutoPolyError as error:
         print(f"error: {error}", file=sys.stderr, flush=True)
 

@@ -6,7 +6,6 @@ searches, the second stands still, so that both do not share the cores.
 
 import asyncio
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
 from agents.studio.channel import Channel
@@ -33,6 +32,7 @@ class Studio:
         self.channel = Channel()
         self.items: dict[int, Item] = {}
         self._n_made = 0
+        self._names: set[str] = set()
         self.front, self.back = Worker(self._on_news), Worker(self._on_news)
         self._at_work: dict[Worker, tuple[Item, Task] | None] = {self.front: None, self.back: None}
         self._waiting: list[Item] = []  # for their search, the next one first
@@ -57,9 +57,7 @@ class Studio:
     def add(self, found: Opened, *, waits: bool) -> Item:
         """A new item of a file that was read; searched at once, or in its turn where it `waits`."""
         self._n_made += 1
-        name = self._free_name(found.name)
-        silhouette = None if found.silhouette is None else replace(found.silhouette, name=name)
-        item = Item.of(self._n_made, name, replace(found, silhouette=silhouette))
+        item = Item.of(self._n_made, found)
         item.is_front = not waits
         self.items[item.id] = item
         if item.silhouette is None:
@@ -80,19 +78,19 @@ class Studio:
         self._tell_list()
         self._assign()
 
-    def _free_name(self, wanted: str) -> str:
-        """A name that no other item has, as results are named after it."""
-        taken = {item.name.casefold() for item in self.items.values()}
-        name, count = wanted, 1
-        while name.casefold() in taken:
+    def named(self, found: Opened) -> Opened:
+        """The file under a name that no other one has had, as results are named after it."""
+        name, count = found.name, 1
+        while name.casefold() in self._names:
             count += 1
-            name = f"{wanted}-{count}"
-        return name
+            name = f"{found.name}-{count}"
+        self._names.add(name.casefold())
+        return found.under(name)
 
     def with_object(self, item: Item, options: ObjectOptions, found: Opened) -> None:
         """Other options for what the object is, and the mask that they found."""
         item.options, item.problem = options, found.problem
-        item.silhouette = None if found.silhouette is None else replace(found.silhouette, name=item.name)
+        item.silhouette = found.silhouette
         item.wish_number += 1
         if item.silhouette is None:
             self._withdraw(item)

@@ -36,6 +36,11 @@ class Opened:
     shown: bytes = field(default=b"", repr=False)  # the picture as a PNG of at most SHOWN pixels a side
     small: bytes = field(default=b"", repr=False)
 
+    def under(self, name: str) -> "Opened":
+        """The same under another name."""
+        silhouette = None if self.silhouette is None else replace(self.silhouette, name=name)
+        return replace(self, name=name, silhouette=silhouette)
+
 
 async def body_of(request: Request, most_bytes: int) -> bytes:
     """The body of a request. Raises TooLargeError as soon as it has more bytes, whatever it said before."""

@@ -256,6 +256,25 @@ class Page:
         self.send("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
         return x, y
 
+    def drag(self, start: tuple[float, float], end: tuple[float, float], n_moves: int = 6) -> None:
+        """Press the mouse at a place (x, y in CSS pixels), move it to another one in a few moves, and let go."""
+        self.send("Input.dispatchMouseEvent", type="mouseMoved", x=start[0], y=start[1])
+        self.send("Input.dispatchMouseEvent", type="mousePressed", x=start[0], y=start[1], button="left", clickCount=1)
+        for k in range(1, n_moves + 1):
+            x, y = (a + (b - a) * k / n_moves for a, b in zip(start, end, strict=True))
+            self.send("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y, button="left", buttons=1)
+        self.send("Input.dispatchMouseEvent", type="mouseReleased", x=end[0], y=end[1], button="left", clickCount=1)
+
+    def drop(self, *paths: str | os.PathLike[str], x: float = 400, y: float = 300) -> None:
+        """Drop files on a place of the page, as from a file manager."""
+        data = {"items": [], "files": [os.path.abspath(path) for path in paths], "dragOperationsMask": 1}
+        for kind in ("dragEnter", "dragOver", "drop"):
+            self.send("Input.dispatchDragEvent", type=kind, x=x, y=y, data=data)
+
+    def text(self, selector: str) -> str:
+        """The text of the first element of a CSS selector."""
+        return str(self.evaluate(f"document.querySelector({json.dumps(selector)}).textContent"))
+
     def press(self, key: str) -> None:
         """Press and release a key by the name that JavaScript's `event.key` has: one of KEYS, or a letter or digit."""
         code, number, text = KEYS.get(key, (f"Key{key.upper()}", ord(key.upper()[0]), key))

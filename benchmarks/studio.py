@@ -1,0 +1,222 @@
+"""The figures of the studio, in real Chromium: `python -m benchmarks.studio [--seconds S] [--rounds N]`.
+
+Pictures are objects of `autopoly_env.targets`, drawn 1,000 x 1,000. The refits that are lost against the command are
+those of the same search at equal seconds, the command's and the studio's in turn, with the page open and visible.
+"""
+
+import argparse
+import json
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from autopoly_env.targets import ObjectTargets
+from tests.helpers.browser import Browser, Page
+from tests.helpers.studio import PATIENCE, Running, serving, solved
+
+SIDE = 1000  # pixels of a picture
+PAINTED = "#tab-hand", 'input[value="paint"]'
+FIRST_MESH = """new Promise(done => {
+  const faces = document.getElementById("faces"), began = window.began = performance.now();
+  new MutationObserver((_, observer) => {
+    if (!faces.children.length) return;
+    observer.disconnect();
+    requestAnimationFrame(() => done((performance.now() - began) / 1000));
+  }).observe(faces, { childList: true });
+  fetch("data:image/png;base64,PICTURE").then(answer => answer.blob()).then(blob => {
+    const transfer = new DataTransfer();
+    transfer.items.add(new File([blob], "NAME.png", { type: "image/png" }));
+    window.dispatchEvent(new DragEvent("drop", { dataTransfer: transfer, cancelable: true }));
+  });
+})"""
+COUNT_UPDATES = """window.n_updates = 0; window.first = window.last = 0;
+new MutationObserver(() => {
+  if (!document.getElementById("count").textContent.includes("refits")) return;
+  window.last = performance.now();
+  window.first = window.first || window.last;
+  window.n_updates += 1;
+}).observe(document.getElementById("count"), { childList: true, characterData: true, subtree: true })"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Measure everything and print a line for each figure; 1 if one is missed."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.studio", description=__doc__.splitlines()[0])
+    parser.add_argument("--seconds", type=float, default=6.0, help="of each search whose refits are counted")
+    parser.add_argument("--rounds", type=int, default=5, help="of each figure")
+    given = parser.parse_args(arguments)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        pictures = [picture(folder, k) for k in range(given.rounds)]
+        rows = [
+            *_in_the_page(pictures, folder),
+            _updates_and_refits(pictures[: given.rounds], given.seconds, folder),
+            _tab_closed(folder),
+        ]
+    missed = 0
+    for row in rows:
+        for what, asked, reached, is_well in row:
+            missed += not is_well
+            print(f"{what:62} {asked:>12} {reached:>28} {'' if is_well else 'MISSED'}", flush=True)
+    return int(missed > 0)
+
+
+Row = list[tuple[str, str, str, bool]]
+
+
+def picture(folder: Path, k: int) -> Path:
+    """An object, black on white, SIDE x SIDE."""
+    mask = ObjectTargets("chair" if k % 2 else "mug").sample(k).target(SIDE).mask
+    path = folder / f"object-{k}.png"
+    Image.fromarray(np.where(mask, np.uint8(30), np.uint8(255))).save(path)
+    return path
+
+
+def opened(browser: Browser, studio: Running) -> Page:
+    """The page, once the kernels are warm."""
+    page = browser.open(studio.address, width=1280, height=800)
+    heard = """new Promise(done => {
+      const source = new EventSource("events?id=0");
+      source.addEventListener("crew", event => {
+        if (JSON.parse(event.data).is_ready) { source.close(); done(true); }
+      });
+    })"""
+    page.evaluate(heard)
+    return page
+
+
+def _in_the_page(pictures: Sequence[Path], folder: Path) -> list[Row]:
+    """From a drop to the first mesh; from a stroke to a search that minds it."""
+    import base64
+
+    firsts, strokes = [], []
+    with serving(out=folder / "out") as studio, Browser() as browser:
+        page = opened(browser, studio)
+        for k, path in enumerate(pictures):
+            data = base64.b64encode(path.read_bytes()).decode()
+            page.evaluate("document.getElementById('faces').replaceChildren()")
+            firsts.append(page.evaluate(FIRST_MESH.replace("PICTURE", data).replace("NAME", f"drop-{k}")))
+            for selector in PAINTED:
+                page.click(selector)
+            strokes += [_stroke(page, n) for n in range(3)]
+            solved(page)
+    return [
+        [_row("from a drop, 1,000 x 1,000, to the first mesh", firsts, 1.0)],
+        [_row("from a stroke of importance to a search that minds it", strokes, 0.5)],
+    ]
+
+
+def _row(what: str, seconds: Sequence[float], most: float) -> tuple[str, str, str, bool]:
+    reached = f"{statistics.median(seconds):.2f} s, at most {max(seconds):.2f} s"
+    return what, f"<= {most:g} s", reached, max(seconds) <= most
+
+
+def _stroke(page: Page, n: int) -> float:
+    """Seconds from the end of a stroke until the page shows news of a search with it."""
+    page.evaluate(
+        """document.getElementById("mesh").addEventListener("pointerup", () => {
+          const began = performance.now(), source = new EventSource(`events?id=${location.hash.slice(1)}`);
+          let wish = null;
+          window.took = new Promise(done => {
+            source.addEventListener("item", event => {
+              const item = JSON.parse(event.data);
+              if (item.is_painted) wish = item.wish;
+            });
+            source.addEventListener("live", event => {
+              if (wish !== null && JSON.parse(event.data).wish === wish && wish > (window.heard || 0)) {
+                window.heard = wish; source.close(); done((performance.now() - began) / 1000);
+              }
+            });
+          });
+        }, { once: true })"""
+    )
+    page.drag((300 + 60 * n, 300), (420 + 60 * n, 380 + 20 * n))
+    return float(page.evaluate("window.took"))
+
+
+def _updates_and_refits(pictures: Sequence[Path], seconds: float, folder: Path) -> Row:
+    rates, ours, theirs = [], 0, 0
+    with serving(out=folder / "out") as studio, Browser() as browser:
+        page = opened(browser, studio)
+        for path in pictures:
+            theirs += _refits_of_command(path, seconds, folder)
+            page.drop(path)
+            page.wait_for(f"document.getElementById('name').textContent === '{path.stem}'")
+            page.evaluate(COUNT_UPDATES)
+            page.evaluate(
+                f"""(seconds => {{ seconds.value = {seconds}; seconds.dispatchEvent(new Event("change")); }})
+                (document.getElementById("seconds"))"""
+            )
+            page.wait_for("document.getElementById('count').textContent.includes('searching')")
+            page.evaluate("window.n_updates = 0, window.first = 0")
+            solved(page)
+            n, first, last = page.evaluate("[window.n_updates, window.first, window.last]")
+            rates.append(1000 * (n - 1) / max(1.0, last - first))
+            ours += int(page.text("#count").split(" refits")[0].split()[-1])
+    lost = 100 * (1 - ours / theirs)
+    return [
+        (
+            "updates while searching",
+            ">= 5 a second",
+            f"{statistics.median(rates):.1f}, at least {min(rates):.1f} a second",
+            min(rates) >= 5,
+        ),
+        (f"refits lost against the command, {seconds:g} s", "<= 3 %", f"{lost:.1f} % of {theirs}", lost <= 3.0),
+    ]
+
+
+def _refits_of_command(path: Path, seconds: float, folder: Path) -> int:
+    words = [
+        sys.executable,
+        "-m",
+        "agents.solve",
+        path,
+        "--style",
+        "modeller",
+        "--seconds",
+        seconds,
+        "--json",
+        "--quiet",
+    ]
+    done = subprocess.run(
+        [*map(str, words), "--out", str(folder / "command")],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        check=True,
+    )
+    return int(json.loads(done.stdout)["refits"])
+
+
+def _tab_closed(folder: Path) -> Row:
+    """Fifty pictures at once; the tab is closed in the middle and opened again."""
+    paths = []
+    for k in range(50):
+        mask = ObjectTargets().sample(k).target(256).mask
+        paths.append(folder / f"queue-{k}.png")
+        Image.fromarray(np.where(mask, np.uint8(0), np.uint8(255))).save(paths[-1])
+    with serving(out=folder / "out") as studio, Browser() as browser:
+        page = opened(browser, studio)
+        page.drop(*paths)
+        n_listed = "document.querySelectorAll('#list li').length"
+        page.wait_for(f"{n_listed} === 50")
+        page.wait_for("document.querySelectorAll('#list li.done').length >= 5")
+        page.close()
+        time.sleep(2.0)
+        page = browser.open(studio.address)
+        page.wait_for(f"{n_listed} === 50")
+        deadline = time.monotonic() + PATIENCE
+        while page.evaluate("document.querySelectorAll('#list li.done').length") < 50 and time.monotonic() < deadline:
+            time.sleep(0.5)
+        n_done = page.evaluate("document.querySelectorAll('#list li.done').length")
+    return [("50 pictures, tab closed in the middle, opened again", "all done", f"{n_done} of 50", n_done == 50)]
+
+
+if __name__ == "__main__":
+    sys.exit(main())
