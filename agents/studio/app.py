@@ -205,10 +205,9 @@ class _Pages:
 
     async def _locks(self, item: Item, request: Request) -> None:
         ids = (await _json(request)).get("ids")
-        known = set() if item.version is None else set(item.version.sequence.final().vertex_ids)
-        if not isinstance(ids, list) or not all(type(one) is int and one in known for one in ids):
+        if not isinstance(ids, list) or not all(type(one) is int for one in ids):
             raise ConfigError("expected ids of vertices of the mesh")
-        item.locked = tuple(sorted(set(ids)))
+        item.lock(tuple(ids))
         self._studio.tell(item)
 
     async def _edit(self, item: Item, request: Request) -> None:

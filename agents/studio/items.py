@@ -1,7 +1,7 @@
 """`Item`: a picture in the studio, with all that was chosen, wished for and found. It lives in the server's memory."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from agents.commands import pictures
@@ -9,6 +9,7 @@ from agents.studio.choices import Choices, Task, as_plain
 from agents.studio.masks import painted_target, plain_mask
 from agents.studio.shapes import plain_mesh
 from agents.studio.uploads import Opened
+from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.score import Score, ScoreWeights, score
 from autopoly_env.sequence import ConstructionSequence
@@ -28,6 +29,8 @@ class Version:
     command: str = ""  # what to type for the same; empty where a hand has had a part in it
     task: Task | None = None  # the search that found it
     notes: tuple[str, ...] = ()
+    locked: tuple[int, ...] = ()  # vertices that stay where they are when a search goes on from it
+    is_by_hand: bool = False  # whether a hand has had a part in it, which later searches are to keep
 
     @property
     def score(self) -> dict[str, Any]:
@@ -47,7 +50,6 @@ class Item:
     problem: str = ""  # of the picture, or of the last search
     choices: Choices = field(default_factory=Choices)
     painted: bytes | None = None
-    locked: tuple[int, ...] = ()
     shown: bytes = b""
     small: bytes = b""
     status: str = IDLE
@@ -65,9 +67,8 @@ class Item:
         if found.shared is not None:
             item.choices, item.painted = found.shared.choices, found.shared.painted
         if found.sequence is not None:
-            item.push(Version(found.sequence, "opened"))
-            if found.shared is not None:
-                item.locked = found.shared.locked
+            locked = () if found.shared is None else found.shared.locked
+            item.push(Version(found.sequence, "opened", locked=locked, is_by_hand=True))
         return item
 
     @property
@@ -77,16 +78,23 @@ class Item:
 
     def push(self, version: Version) -> None:
         """Look at a new version; those that were undone are gone."""
-        self.versions = [*self.versions[: self.at + 1], version][-MOST_VERSIONS:]
-        self.at = len(self.versions) - 1
         names = set(version.sequence.final().vertex_ids)
-        self.locked = tuple(name for name in self.locked if name in names)
+        kept = replace(version, locked=tuple(name for name in version.locked if name in names))
+        self.versions = [*self.versions[: self.at + 1], kept][-MOST_VERSIONS:]
+        self.at = len(self.versions) - 1
+
+    def lock(self, names: tuple[int, ...]) -> None:
+        """These vertices, and no others, are to stay. Raises ConfigError for those that there are not."""
+        version = self.version
+        if version is None or not set(names) <= set(version.sequence.final().vertex_ids):
+            raise ConfigError("expected ids of vertices of the mesh")
+        self.versions[self.at] = replace(version, locked=tuple(sorted(set(names))))
 
     def task(self, *, goes_on: bool = False, steps: ConstructionSequence | None = None) -> Task:
         """A search for what is wished for now, from the picture or from the version that is looked at."""
         assert self.silhouette is not None
-        start = self.version.sequence if goes_on and self.version is not None else None
-        locked = self.locked if start is not None else ()
+        version = self.version if goes_on else None
+        start, locked = (None, ()) if version is None else (version.sequence, version.locked)
         return Task(self.silhouette, self.options, self.choices, self.painted, start, locked, steps)
 
     def target(self) -> Silhouette:
@@ -128,7 +136,7 @@ class Item:
             **plain_mask(self.silhouette),
             "choices": as_plain(self.choices),
             "is_painted": self.painted is not None,
-            "locked": list(self.locked),
+            "locked": [] if self.version is None else list(self.version.locked),
             "wish": self.wish_number,
             "n_undo": max(0, self.at),
             "n_redo": len(self.versions) - 1 - self.at,

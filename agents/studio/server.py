@@ -2,6 +2,8 @@
 
 import asyncio
 import contextlib
+import logging
+import os
 import secrets
 import signal
 import socket
@@ -14,6 +16,7 @@ from pathlib import Path
 import uvicorn
 
 from agents.commands.running import TOLD
+from agents.commands.starting import INTERRUPTED
 from agents.studio import taking
 from agents.studio.app import app_of, stem_of
 from agents.studio.guard import Guard
@@ -60,8 +63,10 @@ async def _serve(given: Sequence[Path], listening: socket.socket, out: Path, ope
     config = uvicorn.Config(
         guarded, log_config=None, access_log=False, lifespan="off", server_header=False, timeout_graceful_shutdown=1
     )
+    logging.getLogger("uvicorn").addHandler(logging.NullHandler())  # what there is to say the page says
+    logging.getLogger("uvicorn").propagate = False
     server = _Quiet(config)
-    presses = _Presses(server)
+    _heed_ctrl_c(server, studio)
     serving = asyncio.create_task(server.serve(sockets=[listening]))
     address = f"http://{HOST}:{port}/{token}/"
     print(
@@ -72,29 +77,28 @@ async def _serve(given: Sequence[Path], listening: socket.socket, out: Path, ope
     for path in given:
         await _open(studio, path, waits=len(given) > 1)
     await serving
-    presses.is_closing = True
     return await _close(studio, out) or TOLD
 
 
-class _Presses:
-    """Ctrl-C: the first ends the server, a second one everything at once."""
+def _heed_ctrl_c(server: uvicorn.Server, studio: Studio) -> None:
+    """The first Ctrl-C ends the server, a second one everything at once."""
+    loop = asyncio.get_running_loop()
+    n_pressed = 0
 
-    def __init__(self, server: uvicorn.Server) -> None:
-        self._server = server
-        self._n_pressed = 0
-        self.is_closing = False
-        loop = asyncio.get_running_loop()
-        for number in (signal.SIGINT, signal.SIGTERM):
-            try:
-                loop.add_signal_handler(number, self._pressed)
-            except NotImplementedError:  # on Windows
-                signal.signal(number, lambda *_: loop.call_soon_threadsafe(self._pressed))
+    def pressed() -> None:
+        nonlocal n_pressed
+        n_pressed += 1
+        if n_pressed > 1:
+            os.write(2, b"aborted by Ctrl-C; the files that were written are whole\n")
+            os._exit(INTERRUPTED)
+        studio.channel.close()  # so that no tab holds the server up
+        server.should_exit = True
 
-    def _pressed(self) -> None:
-        self._n_pressed += 1
-        self._server.should_exit = True
-        if self._n_pressed > 1:
-            raise KeyboardInterrupt
+    for number in (signal.SIGINT, signal.SIGTERM):
+        try:
+            loop.add_signal_handler(number, pressed)
+        except NotImplementedError:  # on Windows
+            signal.signal(number, lambda *_: loop.call_soon_threadsafe(pressed))
 
 
 async def _open(studio: Studio, path: Path, *, waits: bool) -> None:

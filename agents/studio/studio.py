@@ -5,13 +5,14 @@ searches, the second stands still, so that both do not share the cores.
 """
 
 import asyncio
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from agents.studio.channel import Channel
 from agents.studio.choices import Choices, Task
-from agents.studio.crew import Worker
+from agents.studio.crew import Deliver, Worker
 from agents.studio.items import DONE, FAILED, IDLE, PAUSED, SEARCHING, WAITING, Item, Version
+from agents.studio.masks import painted_target
 from agents.studio.uploads import Opened
 from autopoly_env.errors import AutoPolyError, ConfigError
 from autopoly_env.sequence import ConstructionSequence
@@ -28,12 +29,12 @@ class NoItemError(AutoPolyError):
 class Studio:
     """What the server does, without the web."""
 
-    def __init__(self) -> None:
+    def __init__(self, hire: Callable[[Deliver], Worker] = Worker) -> None:
         self.channel = Channel()
         self.items: dict[int, Item] = {}
         self._n_made = 0
         self._names: set[str] = set()
-        self.front, self.back = Worker(self._on_news), Worker(self._on_news)
+        self.front, self.back = hire(self._on_news), hire(self._on_news)
         self._at_work: dict[Worker, tuple[Item, Task] | None] = {self.front: None, self.back: None}
         self._waiting: list[Item] = []  # for their search, the next one first
         self._is_closing = False
@@ -104,18 +105,24 @@ class Studio:
 
     def choose(self, item: Item, choices: Choices) -> None:
         """Other choices; what is searched for changes at once."""
+        if choices == item.choices:
+            return
         item.choices = choices
-        item.wish_number += 1
-        self.search(item)
+        self._wish_again(item)
 
     def paint(self, item: Item, painted: bytes | None) -> None:
         """Where matching matters; what is searched for changes at once."""
         if painted == item.painted:
             return
+        if item.silhouette is not None:
+            painted_target(item.silhouette, painted)  # which says where that is impossible
         item.painted = painted
+        self._wish_again(item)
+
+    def _wish_again(self, item: Item) -> None:
+        """Search for what is wished for now; what a hand has made is gone on from."""
         item.wish_number += 1
-        item.target()  # which says where that is impossible
-        self.search(item)
+        self.search(item, goes_on=item.version is not None and item.version.is_by_hand)
 
     def search(self, item: Item, *, goes_on: bool = False, steps: ConstructionSequence | None = None) -> None:
         """Search anew, from the picture or on from the version that is looked at; or tell `steps` again for it."""
@@ -221,8 +228,8 @@ class Studio:
         """What a hand has made of the version that was looked at; `locked`: vertices that are to stay there."""
         if self._worker_of(item) is not None or item in self._waiting:
             self._withdraw(item)
-        item.locked = tuple(dict.fromkeys((*item.locked, *locked)))
-        item.push(Version(sequence, told))
+        before = () if item.version is None else item.version.locked
+        item.push(Version(sequence, told, locked=tuple(sorted({*before, *locked})), is_by_hand=True))
         item.status, item.problem = DONE, ""
         self.tell(item)
         self._assign()
@@ -230,9 +237,6 @@ class Studio:
     def look_at(self, item: Item, step: int) -> None:
         """Undo (-1) or redo (1)."""
         item.at = min(max(0, item.at + step), len(item.versions) - 1)
-        if item.version is not None:
-            names = set(item.version.sequence.final().vertex_ids)
-            item.locked = tuple(name for name in item.locked if name in names)
         self.tell(item)
 
     # --- news ---
@@ -272,4 +276,5 @@ def _version_of(task: Task, item: Item, news: dict[str, Any]) -> Version:
     notes = list(news["notes"])
     if news["stopped_by"] in ("interrupted", "seconds"):
         notes.append("the clock had a part in it: give a number of refits for a result that repeats bit for bit")
-    return Version(sequence, told, task.command(f"{item.name}.png"), task, tuple(notes))
+    command = task.command(f"{item.name}.png")
+    return Version(sequence, told, command, task, tuple(notes), task.locked, is_by_hand=task.start is not None)

@@ -45,7 +45,9 @@ class Taking:
         if item.version is None:
             raise ConfigError("there is no mesh yet: search first")
         sequence = item.version.sequence
-        shared = Shared(item.name, item.picture, item.options, item.choices, item.painted, item.locked, sequence)
+        shared = Shared(
+            item.name, item.picture, item.options, item.choices, item.painted, item.version.locked, sequence
+        )
         return cls(item.name, item.version, item.silhouette, shared)
 
 

@@ -74,6 +74,8 @@ function open(id) {
 const close = id => trying(ask(`pictures/${id}`, { method: "DELETE" }));
 
 function showItem(item) {
+  if (item.problem && item.target && item.problem !== state.problem) say(item.problem);
+  state.problem = item.problem;
   byId("name").textContent = item.name;
   document.title = `${item.name} – AutoPoly studio`;
   const key = `${item.id} ${item.target}`;
@@ -144,7 +146,7 @@ function showState() {
   const worth = item.version ? `r_all ${item.version.score.total.toFixed(2)}` : "";
   const told = {
     searching: !crew.is_ready && !live ? "getting ready (the first time this takes minutes) …" : "searching", paused: "paused", waiting: "waits for its turn",
-    done: item.version?.told ?? "", failed: "no mesh", idle: "",
+    done: item.version?.told ?? "", failed: item.version ? "no other mesh" : "no mesh", idle: "",
   }[item.status];
   byId("count").textContent = live && isBusy ? `${told}: ${live.refits} refits, ${live.seconds.toFixed(1)} s` : told;
   announce(item.status === "done" ? `${item.name}: ${worth}, ${item.version?.mesh.counts[2]} faces, ${told}` : `${item.name}: ${told} ${item.problem}`);
