@@ -17,12 +17,12 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Route
 
-from agents.options import validated
 from agents.studio import by_hand, edits, taking, uploads
 from agents.studio.choices import Choices
 from agents.studio.items import Item
 from agents.studio.masks import plain_mask
 from agents.studio.painting import SIDE, check_painted
+from agents.studio.reading import options_of
 from agents.studio.studio import CREW, LIST, NoItemError, Studio
 from autopoly_env.errors import AutoPolyError, ConfigError
 from autopoly_env.export import to_html
@@ -177,14 +177,14 @@ class _Pages:
         return Response(status_code=204)
 
     async def _object(self, item: Item, request: Request) -> None:
-        options = validated(ObjectOptions, await _json(request), "")
+        options = options_of(ObjectOptions, await _json(request))
         found = await asyncio.to_thread(by_hand.look_again, item, options)
         await asyncio.to_thread(plain_mask, found.silhouette)
         item.is_front = True
         self._studio.with_object(item, options, found)
 
     async def _choices(self, item: Item, request: Request) -> None:
-        choices = validated(Choices, await _json(request), "")
+        choices = options_of(Choices, await _json(request))
         item.is_front = True
         self._studio.choose(item, choices)
 
@@ -222,7 +222,7 @@ class _Pages:
                 sequence, moved = await asyncio.to_thread(by_hand.pull, item, places)
                 self._studio.edited(item, sequence, f"vertex {vertex} pulled by hand", moved)
             case {"do": operator, **rest} if operator != "pull":
-                step = validated(edits.Asked, {"operator": operator, **rest}, "edit: ")
+                step = options_of(edits.Asked, {"operator": operator, **rest}, "edit: ")
                 sequence = await asyncio.to_thread(by_hand.change, item, step)
                 self._studio.edited(item, sequence, f"{step.operator.replace('_', ' ')} by hand")
             case _:

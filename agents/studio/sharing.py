@@ -11,9 +11,9 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from agents.commands import pictures
-from agents.options import validated
 from agents.studio.choices import Choices
 from agents.studio.painting import check_painted
+from agents.studio.reading import options_of
 from autopoly_env.errors import SequenceError
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.shown import short
@@ -76,19 +76,12 @@ def read_shared(text: str) -> Shared | None:
     return Shared(
         name,
         _unpacked(values, "picture"),
-        _config(ObjectOptions, values, "object"),
-        _config(Choices, values, "choices"),
+        options_of(ObjectOptions, values.get("object", {}), "object: "),
+        options_of(Choices, values.get("choices", {}), "choices: "),
         None if painted is None else check_painted(painted),
         tuple(locked),
         None if sequence is None else ConstructionSequence.from_json(json.dumps(sequence)),
     )
-
-
-def _config(kind: type[Any], values: dict[str, Any], name: str) -> Any:
-    given = values.get(name, {})
-    if not isinstance(given, dict):
-        raise SequenceError(f"{name} is {short(given)}; expected options")
-    return validated(kind, given, f"{name}: ")
 
 
 def _packed(data: bytes | None) -> str | None:
