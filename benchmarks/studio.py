@@ -23,19 +23,17 @@ from tests.helpers.studio import PATIENCE, Running, serving, solved
 
 SIDE = 1000  # pixels of a picture
 PAINTED = "#tab-hand", 'input[value="paint"]'
-FIRST_MESH = """new Promise(done => {
-  const faces = document.getElementById("faces"), began = window.began = performance.now();
-  new MutationObserver((_, observer) => {
-    if (!faces.children.length) return;
-    observer.disconnect();
-    requestAnimationFrame(() => done((performance.now() - began) / 1000));
-  }).observe(faces, { childList: true });
-  fetch("data:image/png;base64,PICTURE").then(answer => answer.blob()).then(blob => {
-    const transfer = new DataTransfer();
-    transfer.items.add(new File([blob], "NAME.png", { type: "image/png" }));
-    window.dispatchEvent(new DragEvent("drop", { dataTransfer: transfer, cancelable: true }));
-  });
-})"""
+FIRST_MESH = """(faces => {
+  faces.replaceChildren();
+  window.took = new Promise(done => addEventListener("drop", () => {
+    const began = performance.now();
+    new MutationObserver((_, observer) => {
+      if (!faces.children.length) return;
+      observer.disconnect();
+      requestAnimationFrame(() => done((performance.now() - began) / 1000));
+    }).observe(faces, { childList: true });
+  }, { once: true, capture: true }));
+})(document.getElementById("faces"))"""
 COUNT_UPDATES = """window.n_updates = 0; window.first = window.last = 0;
 new MutationObserver(() => {
   if (!document.getElementById("count").textContent.includes("refits")) return;
@@ -93,15 +91,13 @@ def opened(browser: Browser, studio: Running) -> Page:
 
 def _in_the_page(pictures: Sequence[Path], folder: Path) -> list[Row]:
     """From a drop to the first mesh; from a stroke to a search that minds it."""
-    import base64
-
     firsts, strokes = [], []
     with serving(out=folder / "out") as studio, Browser() as browser:
         page = opened(browser, studio)
-        for k, path in enumerate(pictures):
-            data = base64.b64encode(path.read_bytes()).decode()
-            page.evaluate("document.getElementById('faces').replaceChildren()")
-            firsts.append(page.evaluate(FIRST_MESH.replace("PICTURE", data).replace("NAME", f"drop-{k}")))
+        for path in pictures:
+            page.evaluate(FIRST_MESH)
+            page.drop(path)
+            firsts.append(float(page.evaluate("window.took")))
             for selector in PAINTED:
                 page.click(selector)
             strokes += [_stroke(page, n) for n in range(3)]

@@ -74,13 +74,14 @@ class Studio:
         """Close a picture."""
         self._withdraw(item)
         del self.items[item.id]
+        self._names.discard(item.name.casefold())
         for key in (f"item-{item.id}", f"live-{item.id}"):
             self.channel.forget(key)
         self._tell_list()
         self._assign()
 
     def named(self, found: Opened) -> Opened:
-        """The file under a name that no other one has had, as results are named after it."""
+        """The file under a name that no other one has, as results are named after it."""
         name, count = found.name, 1
         while name.casefold() in self._names:
             count += 1

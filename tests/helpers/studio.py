@@ -15,7 +15,8 @@ from tests.helpers.browser import Page
 from tests.helpers.paths import ROOT
 
 ADDRESS = re.compile(r"http://127\.0\.0\.1:\d+/\S+/")
-PATIENCE = 120.0  # seconds until a server that does not end is killed
+PATIENCE = 120.0  # seconds until a server that does not end is given up
+LIFETIME = 900.0  # seconds, after which a server is killed in any case
 DONE = "document.getElementById('count').textContent.includes(' after ')"  # the search has come to its end
 
 
@@ -47,7 +48,7 @@ def serving(*arguments: object, out: Path) -> Iterator[Running]:
     """A studio on any free port, without a browser."""
     words = [sys.executable, "-m", "agents.studio", "--no-browser", "--out", str(out), *map(str, arguments)]
     process = subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    killer = threading.Timer(PATIENCE, process.kill)
+    killer = threading.Timer(LIFETIME, process.kill)
     killer.start()
     try:
         assert process.stdout is not None and process.stderr is not None

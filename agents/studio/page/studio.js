@@ -240,6 +240,10 @@ trying(ask("examples").then(answer => answer.json()).then(names => byId("example
   button.addEventListener("click", () => trying(ask(`examples/${name}`, { method: "POST" }).then(answer => answer.json()).then(({ id }) => open(id))));
   return make("li", {}, button);
 }))));
+addEventListener("hashchange", () => {
+  const id = Number(location.hash.slice(1));
+  if (state.items.some(item => item.id === id)) open(id);
+});
 stage.choose("look");
 state.id = Number(location.hash.slice(1)) || 0;
 news.listen(state.id);
