@@ -6,7 +6,6 @@ where the browser tells where it comes from, to come from here.
 """
 
 import secrets
-from urllib.parse import unquote
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import PlainTextResponse
@@ -69,7 +68,7 @@ class Guard:
             return PlainTextResponse("This server answers its own page alone.\n", 403)
         if headers.get("sec-fetch-site", "none") not in _OWN_SITE:
             return PlainTextResponse("This server answers its own page alone.\n", 403)
-        given = unquote(scope["path"]).split("/", 2)
+        given = scope["path"].split("/", 2)
         if len(given) < 3 or not secrets.compare_digest(given[1].encode(), self._token.encode()):
             return PlainTextResponse("Open the address that `python -m agents.studio` has printed, all of it.\n", 403)
         length = headers.get("content-length", "0")

@@ -1,5 +1,6 @@
 """What the page shows of a mask, and what a search sees of a painted one: each made once, for it takes a moment."""
 
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -26,7 +27,10 @@ def plain_mask(silhouette: Silhouette | None) -> dict[str, Any]:
     }
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=2)
 def painted_target(silhouette: Silhouette, painted: bytes | None) -> Silhouette:
-    """The silhouette with what matters in it. Raises ConfigError where nothing of the object does."""
-    return silhouette if painted is None else weighted(silhouette, levels_of(painted))
+    """A copy of the silhouette, with what matters in it. Raises ConfigError where nothing of the object does.
+
+    A copy, since its targets take forty times the memory of its mask, and are kept only as long as it is.
+    """
+    return replace(silhouette) if painted is None else weighted(silhouette, levels_of(painted))

@@ -18,7 +18,7 @@ from autopoly_env.errors import AutoPolyError, ConfigError
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import ObjectOptions
 
-MOST_ITEMS, MOST_MEMORY = 500, 1_000_000_000  # pictures, and bytes of their files, that are kept at once
+MOST_ITEMS, MOST_MEMORY = 300, 1_000_000_000  # pictures, and bytes of their files, that are kept at once
 LIST, CREW = "list", "crew"  # keys of the channel; others are those of an item
 
 

@@ -71,15 +71,20 @@ def _opened_text(name: str, data: bytes) -> Opened:
     shared = read_shared(text)
     if shared is None:
         sequence = ConstructionSequence.from_json(text)
-        silhouette = picture_of(sequence.final(), name)
-        return Opened(name, silhouette, sequence=sequence)
+        return _without_picture(name, sequence)
     if shared.picture is None:
         if shared.sequence is None:
             raise SequenceError(f"{name!r} holds neither a picture nor a construction")
-        silhouette = picture_of(shared.sequence.final(), shared.name)
-        return Opened(shared.name, silhouette, sequence=shared.sequence, shared=shared)
+        return replace(_without_picture(shared.name, shared.sequence), shared=shared)
     found = _opened_picture(shared.name, shared.picture, shared.options)
     return replace(found, sequence=shared.sequence, shared=shared)
+
+
+def _without_picture(name: str, sequence: ConstructionSequence) -> Opened:
+    """A construction, which stands for its own picture."""
+    silhouette = picture_of(sequence.final(), name)
+    small = Image.fromarray(~silhouette.mask).convert("L").resize((SMALL, SMALL))
+    return Opened(name, silhouette, sequence=sequence, small=_png(small))
 
 
 def _opened_picture(name: str, data: bytes, options: ObjectOptions) -> Opened:
