@@ -98,6 +98,7 @@ def _in_the_page(pictures: Sequence[Path], folder: Path) -> list[Row]:
             page.evaluate(FIRST_MESH)
             page.drop(path)
             firsts.append(float(page.evaluate("window.took")))
+            page.evaluate("window.heard = 0")
             for selector in PAINTED:
                 page.click(selector)
             strokes += [_stroke(page, n) for n in range(3)]

@@ -106,6 +106,7 @@ async def _open(studio: Studio, path: Path, *, waits: bool) -> None:
     try:
         try:
             data = await asyncio.to_thread(_read, path)
+            studio.check_room(len(data))
         except OSError as error:
             raise ConfigError(f"{path}: cannot be read ({error.strerror})") from None
         studio.add(studio.named(await asyncio.to_thread(opened, stem_of(path.name), data)), waits=waits)

@@ -108,8 +108,9 @@ class Studio:
         """Other choices; what is searched for changes at once."""
         if choices == item.choices:
             return
+        is_other_axis = choices.symmetry != item.choices.symmetry  # about which a hand's mesh need not be symmetric
         item.choices = choices
-        self._wish_again(item)
+        self._wish_again(item, keeps_hand=not is_other_axis)
 
     def paint(self, item: Item, painted: bytes | None) -> None:
         """Where matching matters; what is searched for changes at once."""
@@ -120,10 +121,11 @@ class Studio:
         item.painted = painted
         self._wish_again(item)
 
-    def _wish_again(self, item: Item) -> None:
-        """Search for what is wished for now; what a hand has made is gone on from."""
+    def _wish_again(self, item: Item, *, keeps_hand: bool = True) -> None:
+        """Search for what is wished for now; what a hand has made or locked is gone on from."""
         item.wish_number += 1
-        self.search(item, goes_on=item.version is not None and item.version.is_by_hand)
+        version = item.version
+        self.search(item, goes_on=keeps_hand and version is not None and (version.is_by_hand or bool(version.locked)))
 
     def search(self, item: Item, *, goes_on: bool = False, steps: ConstructionSequence | None = None) -> None:
         """Search anew, from the picture or on from the version that is looked at; or tell `steps` again for it."""

@@ -8,7 +8,7 @@ const TOLD = {
   paint: "Paint where matching matters: the search minds it as soon as the brush is lifted.",
   lock: "Click vertices that are to stay where they are when the search goes on from here.",
   pull: "Drag a vertex to where you want it. It is locked there. With keys: Enter, arrows, Enter.",
-  axis: "Drag the line about which left and right are to be alike, then have it so.",
+  axis: "Drag the line about which left and right are to be alike; the search begins anew with it.",
   split: "Click two corners of a face: an edge joins them.",
   delete: "Click a face that is too much.",
   add: "Click an edge: it gets a vertex in its middle.",
@@ -239,6 +239,7 @@ export class Stage {
       const was = dragging;
       dragging = "";
       if (was === "paint") this.act("paint", this.painting.levels);
+      else if (was === "axis") this.act("axis", this.axisX);
       else if (was === "pull" && event.type === "pointerup") this.drop();
       else if (was === "pull") this.release();
     };

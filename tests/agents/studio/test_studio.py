@@ -157,9 +157,12 @@ def test_going_on__starts_from_what_is_looked_at_and_keeps_its_locks() -> None:
         studio.choose(item, Choices(w_sc=1.0))  # what was gone on from is kept
         assert front.tasks[2].start is not None
         front.finds()
+        studio.choose(item, Choices(w_sc=1.0, symmetry="0.4"))  # about which it is not symmetric
+        assert front.tasks[3].start is None
+        front.finds()
         studio.search(item)
         front.finds()
-        assert front.tasks[3].start is None and item.version is not None and item.version.locked == ()
+        assert front.tasks[4].start is None and item.version is not None and item.version.locked == ()
 
     play(of)
 
