@@ -32,9 +32,9 @@ from autopoly_env.outside import described
 from autopoly_env.score import ScoreWeights, score
 from autopoly_env.silhouette import Silhouette
 
-EVERY = 0.1  # seconds between two reports of a search
+EVERY = 0.125  # seconds between two reports of a search
 RETARGET_REFITS = 300  # as `agents.retarget` by default
-MOST_POINTS = 240  # of a curve
+MOST_POINTS = 120  # of a curve
 
 
 class DroppedError(BaseException):

@@ -5,7 +5,7 @@ const Drawing = (() => {
   const SCALE = 1000; // drawing units a unit square
   const VERTEX_PX = 3.6, HIT_PX = 11;
   const CURVE_INSET = 9, CURVE_TOP = 16, CURVE_BOTTOM = 6; // pixels; the inset is half a slider's thumb
-  const MANY_POINTS = 60; // of a curve, whose points get no dots
+  const MANY_POINTS = 60; // of a curve, above which only the one that is looked at is drawn
   const DRAWN = ["svg", "g", "path", "line", "circle", "text", "mask", "image", "rect", "title"];
 
   const byId = id => document.getElementById(id);
@@ -82,10 +82,11 @@ const Drawing = (() => {
     set(byId("area"), { d: `${path(points)}L${[last[0], bottom + CURVE_BOTTOM]}L${[first[0], bottom + CURVE_BOTTOM]}Z` });
     set(byId("behind"), { d: path(points.slice(0, now + 1)) });
     set(byId("ahead"), { d: path(points.slice(now)) });
-    const small = values.length > MANY_POINTS + 1 ? 0 : 2.4;
-    byId("dots").replaceChildren(...points.map(([cx, cy], k) => {
+    const isMany = values.length > MANY_POINTS + 1;
+    byId("dots").replaceChildren(...points.flatMap(([cx, cy], k) => {
+      if (isMany && k !== now) return [];
       const kind = k === now ? "current" : k < now ? "past" : "ahead";
-      return make("circle", { cx, cy, r: k === now ? 6 : small, class: kind }, make("title", {}, titleOf(k)));
+      return [make("circle", { cx, cy, r: k === now ? 6 : 2.4, class: kind }, make("title", {}, titleOf(k)))];
     }));
     const share = shares[best], anchor = share > 0.85 ? "end" : share < 0.15 ? "start" : "middle";
     byId("dots").append(make("text", { x: points[best][0], y: points[best][1] - 10, "text-anchor": anchor }, `best ${high.toFixed(2)}`));
