@@ -60,7 +60,10 @@ def opened(name: str, data: bytes) -> Opened:
     """
     if data.lstrip()[:1] == b"{":
         return _opened_text(name, data)
-    return _opened_picture(name, data, DEFAULT_OPTIONS)
+    try:
+        return _opened_picture(name, data, DEFAULT_OPTIONS)
+    except SilhouetteError as error:
+        raise SilhouetteError(_named(error, name)) from None
 
 
 def _opened_text(name: str, data: bytes) -> Opened:
@@ -101,7 +104,12 @@ def reopened(name: str, data: bytes, options: ObjectOptions) -> Opened:
     try:
         return Opened(name, load_silhouette(io.BytesIO(data), name=name, options=options), options=options)
     except SilhouetteError as error:  # it is a picture, and other options may find what is in it
-        return Opened(name, None, str(error).replace("the given file object", repr(name)), options=options)
+        return Opened(name, None, _named(error, name), options=options)
+
+
+def _named(error: SilhouetteError, name: str) -> str:
+    """What is wrong with a picture, which the one who says so does not know by its name."""
+    return str(error).replace("the given file object", repr(told(name, 60)))
 
 
 def check_pixels(name: str, data: bytes) -> None:

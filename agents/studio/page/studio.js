@@ -104,9 +104,16 @@ function showItem(item) {
 function showVersion({ mesh, score, totals, n_steps }) {
   stage.showMesh(mesh);
   showFacts(score.total, score.iou, score.self_intersections, mesh.counts);
-  curve(totals.map((_, k) => (n_steps ? k / n_steps : 0)), totals, n_steps, k => `step ${k}: ${totals[k].toFixed(2)}`);
+  drawCurve(totals.map((_, k) => (n_steps ? k / n_steps : 0)), totals, n_steps, k => `step ${k}: ${totals[k].toFixed(2)}`);
   byId("curve").setAttribute("aria-label", `Score by step of the construction: ${totals[0].toFixed(2)} at the start, ${totals[n_steps].toFixed(2)} after ${n_steps} steps`);
 }
+
+let drawn = null; // the curve, to be drawn again where its width changes
+function drawCurve(...what) {
+  drawn = what;
+  curve(...what);
+}
+new ResizeObserver(() => { if (drawn) curve(...drawn); }).observe(byId("controls"));
 
 function showFacts(total, iou, crossings, counts) {
   byId("facts").hidden = false;
@@ -125,7 +132,7 @@ function showLive(live) {
   stage.showTried(live.tried);
   showFacts(live.best, live.iou, live.crossings, live.mesh.counts);
   const most = Math.max(1, live.refits), values = live.curve.map(point => point[1]);
-  curve(live.curve.map(point => point[0] / most), values, values.length - 1, k => `${live.curve[k][0]} refits: ${values[k].toFixed(2)}`);
+  drawCurve(live.curve.map(point => point[0] / most), values, values.length - 1, k => `${live.curve[k][0]} refits: ${values[k].toFixed(2)}`);
   byId("curve").setAttribute("aria-label", `Score by tries: ${values[values.length - 1].toFixed(2)} after ${live.refits} refits`);
   showState();
 }
