@@ -35,6 +35,7 @@ def bound(port: int) -> socket.socket:
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listening.bind((HOST, port))
+        listening.listen()  # whoever has the address may ask, and waits until the server answers
     except OSError as error:
         listening.close()
         reason = error.strerror or error

@@ -184,7 +184,6 @@ export function showList(items, current, open, close) {
     line.className = item.status;
     line.querySelector(".worth").textContent = worth;
     const button = line.querySelector(".open");
-    button.setAttribute("aria-label", `${item.name}, ${worth || "opened"}`);
     if (item.id === current) button.setAttribute("aria-current", "true");
     else button.removeAttribute("aria-current");
     return line;
@@ -200,7 +199,7 @@ export function showList(items, current, open, close) {
 
 function lineOf(item, open, close) {
   const button = make("button", { type: "button", class: "open" },
-    make("img", { src: `pictures/${item.id}/small.png`, alt: "", loading: "lazy" }), make("span", { class: "called", title: item.name }, item.name), make("span", { class: "worth" }));
+    make("img", { src: `pictures/${item.id}/small.png`, alt: "", loading: "lazy" }), make("span", { class: "called", title: item.name }, item.name), " ", make("span", { class: "worth" }));
   button.addEventListener("click", () => open(item.id));
   const cross = make("button", { type: "button", class: "close", "aria-label": `Close ${item.name}` }, "×");
   cross.addEventListener("click", () => close(item.id));
