@@ -33,8 +33,9 @@ def drop(page: Page) -> None:
 def search(page: Page) -> None:
     """A search at work."""
     example(page, "bicycle")
-    page.evaluate("document.getElementById('seconds').value = 30")
-    page.evaluate("document.getElementById('seconds').dispatchEvent(new Event('change'))")
+    page.evaluate(
+        "(one => { one.value = 30; one.dispatchEvent(new Event('change')); })(document.getElementById('seconds'))"
+    )
     page.wait_for("/searching: \\d{3,} refits/.test(document.getElementById('count').textContent)")
     page.click("#play")
     page.wait_for("document.getElementById('count').textContent.startsWith('paused')")

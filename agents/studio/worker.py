@@ -32,7 +32,7 @@ from autopoly_env.outside import described
 from autopoly_env.score import ScoreWeights, score
 from autopoly_env.silhouette import Silhouette
 
-EVERY = 0.125  # seconds between two reports of a search
+EVERY = 0.17  # seconds between two reports of a search, on average
 RETARGET_REFITS = 300  # as `agents.retarget` by default
 MOST_POINTS = 120  # of a curve
 
@@ -178,7 +178,7 @@ class Watch:
 
     def __init__(self, task: Task, number: int, orders: Orders, pipe: Connection) -> None:
         self._task, self._number, self._orders, self._pipe = task, number, orders, pipe
-        self._began, self._said = CLOCK.seconds(), 0.0
+        self._began, self._due = CLOCK.seconds(), 0.0
         self._curve: list[list[float]] = []
         self._best: dict[str, Any] = {}
         self._shown: object = None
@@ -187,9 +187,9 @@ class Watch:
         """Called after every step of the search, in its thread."""
         self._orders.heed()
         now = time.monotonic()
-        if now - self._said < EVERY or progress.best is None:
+        if now < self._due or progress.best is None:
             return
-        self._said = now
+        self._due = max(self._due + EVERY, now)
         if progress.best is not self._shown:
             self._shown = progress.best
             self._best = self._scored(progress.best())

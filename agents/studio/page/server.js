@@ -16,13 +16,14 @@ export const post = (path, value) => ask(path, { method: "POST", body: JSON.stri
 
 /** Calls `post` with the newest value alone while an answer is waited for, so that a slider never gets ahead of it. */
 export function newestOnly(send) {
-  let busy = false, waiting = null;
-  return async function offer(value) {
-    if (busy) { waiting = { value }; return; }
-    busy = true;
-    try { await send(value); } finally { busy = false; }
+  let waiting = null;
+  async function offer(value) {
+    if (offer.isBusy) { waiting = { value }; return; }
+    offer.isBusy = true;
+    try { await send(value); } finally { offer.isBusy = false; }
     if (waiting) { const next = waiting; waiting = null; await offer(next.value); }
-  };
+  }
+  return offer;
 }
 
 /** Hears of all pictures, and of the one that is looked at; silent while nobody sees the page. */

@@ -110,7 +110,8 @@ export class Stage {
   /** Fit the drawing into its place. */
   fit() {
     const [x, y, width, height] = this.box.map(value => value * SCALE), margin = MARGIN * Math.max(width, height);
-    set(this.svg, { viewBox: [x - margin, y - margin, width + 2 * margin, height + 2 * margin].join(" ") });
+    const viewBox = [x - margin, y - margin, width + 2 * margin, height + 2 * margin].join(" ");
+    for (const svg of [byId("under"), this.svg]) set(svg, { viewBox });
     const matrix = this.svg.getScreenCTM();
     if (!matrix || !matrix.a) return;
     this.unit = 1 / matrix.a;

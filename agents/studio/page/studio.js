@@ -6,7 +6,7 @@ import {
 } from "./panels.js";
 
 const { byId, curve, make } = Drawing;
-const AT_ONCE = 2; // uploads
+const AT_ONCE = 2, SETTLED_MS = 30; // uploads; milliseconds
 const state = { id: 0, item: null, items: [], live: null, target: "", crew: { is_ready: true } };
 let messageTimer = 0;
 
@@ -38,7 +38,10 @@ const stage = new Stage((name, value) => {
 });
 const sendChoices = () => sendNewest(choices(state.item.choices.seed, stage.axisX));
 const sendNewest = newestOnly(value => trying(post(path("choices"), value)));
-const sendObject = newestOnly(value => trying(post(path("object"), value)));
+const sendObject = newestOnly(async value => {
+  await trying(post(path("object"), value));
+  await new Promise(done => setTimeout(done, SETTLED_MS)); // until the news of it have come
+});
 
 // --- news ---
 
@@ -88,8 +91,8 @@ function showItem(item) {
     state.target = key;
     stage.showPicture(item.id, item);
   }
-  showObject(item);
-  showChoices(item.choices);
+  if (!sendObject.isBusy) showObject(item); // else what is shown is newer than what has come
+  if (!sendNewest.isBusy) showChoices(item.choices);
   showSaid(item);
   showTaking(item, say);
   const isBusy = ["searching", "waiting", "paused"].includes(item.status);

@@ -57,6 +57,12 @@ def tool(page: Page, name: str) -> None:
     page.click(f'input[name="tool"][value="{name}"]')
 
 
+def choose(page: Page, selector: str, value: str, event: str = "change") -> None:
+    """Choose an entry of a list, or a place of a slider, as a person does."""
+    found = f"document.querySelector({selector!r})"
+    page.evaluate(f"{found}.value = {value!r}; {found}.dispatchEvent(new Event({event!r}))")
+
+
 def held(page: Page) -> ConstructionSequence:
     """The construction that is looked at, as it is taken along."""
     number = page.evaluate("Number(location.hash.slice(1))")
@@ -100,11 +106,10 @@ def test_mask_controls__take_effect_while_they_move(open_studio: Open, tmp_path:
     page.click("#tab-picture")
     mask = "document.querySelector('#target image').getAttribute('href').length"
     both = page.evaluate(mask)
-    page.evaluate("document.getElementById('object').value = 'dark'")
-    page.evaluate("document.getElementById('object').dispatchEvent(new Event('change'))")
+    choose(page, "#object", "dark")
     page.click("#has-threshold")
-    page.evaluate("document.getElementById('threshold').value = 35")
-    page.evaluate("document.getElementById('threshold').dispatchEvent(new Event('input'))")
+    for level in range(50, 34, -1):
+        choose(page, "#threshold", str(level), "input")
     page.wait_for(f"{mask} !== {both}")
     page.wait_for("document.getElementById('notes').textContent.includes('threshold 0.35')")
     solved(page)
@@ -142,8 +147,7 @@ def test_file_that_is_no_picture__is_told_and_the_page_goes_on(open_studio: Open
 def test_pause__stands_still_and_going_on_goes_on(open_studio: Open) -> None:
     page = open_studio()
     example(page, "bicycle")
-    page.evaluate("document.getElementById('seconds').value = 60")
-    page.evaluate("document.getElementById('seconds').dispatchEvent(new Event('change'))")
+    choose(page, "#seconds", "60")
     page.wait_for("/searching: \\d+ refits/.test(document.getElementById('count').textContent)")
     page.click("#play")
     page.wait_for("document.getElementById('count').textContent.startsWith('paused')")
@@ -335,18 +339,11 @@ def test_phone__shows_everything_without_scrolling_sideways(open_studio: Open, d
 # --- the three tasks of docs/studio.md, with the page alone ---
 
 
-def choose(page: Page, selector: str, value: str) -> None:
-    """Choose an entry of a list, as a person does."""
-    found = f"document.querySelector({selector!r})"
-    page.evaluate(f"{found}.value = {value!r}; {found}.dispatchEvent(new Event('change'))")
-
-
 @needs_browser
 def test_task__a_mug_with_its_handle_kept(open_studio: Open) -> None:
     page = open_studio()
     example(page, "mug")
-    page.evaluate("document.getElementById('price').value = 0")  # so simple that the handle would be lost
-    page.evaluate("document.getElementById('price').dispatchEvent(new Event('input'))")
+    choose(page, "#price", "0", "input")  # so simple that the handle is lost
     page.wait_for("document.getElementById('command').textContent.includes('--w-sc 3')")
     solved(page)
     assert not n_holes(held(page)) and "the picture has 1 hole, the mesh none" in page.text("#said")
