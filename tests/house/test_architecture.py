@@ -28,6 +28,8 @@ LINES = [
     ("stable_baselines3", PACKAGES, ("agents/rl", "training/train_rl", "training/policies/session")),
     ("sb3_contrib", PACKAGES, ("agents/rl",)),
     ("ray", PACKAGES, ("training/parallel",)),
+    ("starlette", PACKAGES, ("agents/studio",)),
+    ("uvicorn", PACKAGES, ("agents/studio",)),
 ]
 
 # What runs inside Blender imports nothing of AutoPoly; what packs it imports the world only.
