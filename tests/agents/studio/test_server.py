@@ -418,6 +418,21 @@ def test_ctrl_c_in_mid_search__keeps_what_is_finished_and_the_best_so_far(tmp_pa
         assert ConstructionSequence.load(out / name / "sequence.json").final().counts[2] > 0
 
 
+def test_sequence_and_folder__are_opened_at_the_start_and_what_is_no_picture_is_told(tmp_path: Path) -> None:
+    (tmp_path / "house.json").write_text(house().to_json())
+    drawings = tmp_path / "drawings"
+    drawings.mkdir()
+    for name in ("a", "b"):
+        (drawings / f"{name}.png").write_bytes(png())
+    (drawings / "c.png").write_text("hello")
+    given = (tmp_path / "house.json", drawings)
+    with serving(*given, out=tmp_path / "out") as running, httpx.Client(base_url=running.address, timeout=60) as web:
+        listed = news(web, 0, "list", lambda items: [item["status"] for item in items] == ["done"] * 3)
+        code, _, complained = running.stop()
+    assert [item["name"] for item in listed] == ["house", "a", "b"]
+    assert code == 130 and "error: 'c' is not an image" in complained and "Traceback" not in complained
+
+
 def run(*arguments: object) -> "subprocess.CompletedProcess[str]":
     words = [sys.executable, "-m", "agents.studio", "--no-browser", *map(str, arguments)]
     return subprocess.run(words, cwd=ROOT, capture_output=True, text=True, timeout=PATIENCE)
