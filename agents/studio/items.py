@@ -1,5 +1,6 @@
 """`Item`: a picture in the studio, with all that was chosen, wished for and found. It lives in the server's memory."""
 
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -136,6 +137,7 @@ class Item:
             **plain_mask(self.silhouette),
             "choices": as_plain(self.choices),
             "is_painted": self.painted is not None,
+            "paint": 0 if self.painted is None else zlib.crc32(self.painted),
             "locked": [] if self.version is None else list(self.version.locked),
             "wish": self.wish_number,
             "n_undo": max(0, self.at),

@@ -26,6 +26,7 @@ export class Stage {
     this.locked = new Set();
     this.tool = "look";
     this.painting = new Painting();
+    this.isPainting = false;
     this.level = 255;
     this.radius = 14;
     this.axisX = 0.5;
@@ -210,6 +211,7 @@ export class Stage {
       const item = this.itemOf(event.target);
       if (this.tool === "paint") {
         dragging = "paint";
+        this.isPainting = true;
         last = this.where(event);
         this.painting.stroke(last, last, this.radius, this.level);
         this.showPaint();
@@ -239,6 +241,7 @@ export class Stage {
     const end = event => {
       const was = dragging;
       dragging = "";
+      this.isPainting = false;
       if (was === "paint") this.act("paint", this.painting.levels);
       else if (was === "axis") this.act("axis", this.axisX);
       else if (was === "pull" && event.type === "pointerup") this.drop();

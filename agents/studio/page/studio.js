@@ -7,7 +7,7 @@ import {
 
 const { byId, curve, make } = Drawing;
 const AT_ONCE = 2, SETTLED_MS = 30; // uploads; milliseconds
-const state = { id: 0, item: null, items: [], live: null, target: "", crew: { is_ready: true } };
+const state = { id: 0, item: null, items: [], live: null, target: "", paint: null, crew: { is_ready: true } };
 let messageTimer = 0;
 
 // --- saying ---
@@ -66,7 +66,7 @@ function hearList(items) {
 
 function open(id) {
   if (id === state.id) return;
-  Object.assign(state, { id, item: null, live: null, target: "" });
+  Object.assign(state, { id, item: null, live: null, target: "", paint: null });
   location.hash = `#${id}`;
   stage.showTried(null);
   news.listen(id);
@@ -85,11 +85,14 @@ function showItem(item) {
   if (key !== state.target) {
     if (!state.target.startsWith(`${item.id} `)) {
       stage.axisX = item.version?.axis ?? item.best_axis;
-      trying(stage.loadPaint(item.id, item.is_painted));
       if (!item.target) selectTab("picture");
     }
     state.target = key;
     stage.showPicture(item.id, item);
+  }
+  if (item.paint !== state.paint && !stage.isPainting) { // in this tab or in another one
+    state.paint = item.paint;
+    trying(stage.loadPaint(item.id, item.is_painted));
   }
   if (!sendObject.isBusy) showObject(item); // else what is shown is newer than what has come
   if (!sendNewest.isBusy) showChoices(item.choices);

@@ -183,6 +183,26 @@ def test_stroke_of_the_brush__is_minded_and_stays_when_the_page_is_opened_again(
 
 
 @needs_browser
+def test_two_tabs_on_one_picture__show_the_same(open_studio: Open, studio: Running, browser: Browser) -> None:
+    page = open_studio()
+    example(page, "mug")
+    solved(page)
+    other = browser.open(page.evaluate("location.href"))
+    other.wait_for("document.getElementById('name').textContent === 'mug'")
+    tool(page, "paint")
+    x, y = middle(page, "#mesh")
+    page.drag((x - 60, y), (x - 20, y + 30))
+    other.wait_for("document.querySelector('#painted image') !== null")
+    for tab in (page, other):
+        tab.wait_for("document.getElementById('command').textContent.includes('--importance')")
+    page.click("#undo")
+    for tab in (page, other):
+        tab.wait_for("document.getElementById('redo').ariaDisabled === 'false'")
+    assert page.text("#total") == other.text("#total")
+    other.close()
+
+
+@needs_browser
 def test_vertex__is_pulled_with_the_mouse_locked_and_kept_when_the_search_goes_on(open_studio: Open) -> None:
     page = open_studio()
     example(page, "mug")
