@@ -183,22 +183,26 @@ def test_stroke_of_the_brush__is_minded_and_stays_when_the_page_is_opened_again(
 
 
 @needs_browser
-def test_two_tabs_on_one_picture__show_the_same(open_studio: Open, studio: Running, browser: Browser) -> None:
+def test_two_tabs_on_one_picture__show_the_same_as_soon_as_they_are_looked_at(
+    open_studio: Open, browser: Browser
+) -> None:
     page = open_studio()
     example(page, "mug")
     solved(page)
     other = browser.open(page.evaluate("location.href"))
     other.wait_for("document.getElementById('name').textContent === 'mug'")
+    page.send("Page.bringToFront")
     tool(page, "paint")
     x, y = middle(page, "#mesh")
     page.drag((x - 60, y), (x - 20, y + 30))
+    page.wait_for("document.getElementById('command').textContent.includes('--importance')")
+    other.send("Page.bringToFront")
     other.wait_for("document.querySelector('#painted image') !== null")
-    for tab in (page, other):
-        tab.wait_for("document.getElementById('command').textContent.includes('--importance')")
-    page.click("#undo")
-    for tab in (page, other):
-        tab.wait_for("document.getElementById('redo').ariaDisabled === 'false'")
+    other.wait_for("document.getElementById('command').textContent.includes('--importance')")
     assert page.text("#total") == other.text("#total")
+    other.click("#undo")
+    page.send("Page.bringToFront")
+    page.wait_for("document.getElementById('redo').ariaDisabled === 'false'")
     other.close()
 
 
