@@ -142,11 +142,11 @@ def _updates_and_refits(pictures: Sequence[Path], seconds: float, folder: Path) 
     rates, ours, theirs = [], 0, 0
     with serving(out=folder / "out") as studio, Browser() as browser:
         page = opened(browser, studio)
+        page.evaluate(COUNT_UPDATES)
         for path in pictures:
             theirs += _refits_of_command(path, seconds, folder)
             page.drop(path)
             page.wait_for(f"document.getElementById('name').textContent === '{path.stem}'")
-            page.evaluate(COUNT_UPDATES)
             page.evaluate(
                 f"""(seconds => {{ seconds.value = {seconds}; seconds.dispatchEvent(new Event("change")); }})
                 (document.getElementById("seconds"))"""
