@@ -23,6 +23,7 @@ from benchmarks.curves import need_matplotlib
 from benchmarks.report import Row
 from benchmarks.search_cases import Case, Records, Results, made
 from benchmarks.search_curves import draw_curves
+from benchmarks.search_learning import learning_rows
 
 HELP = """Measure the tree search. Each command prints one table.
 
@@ -189,19 +190,21 @@ def learning(
     w_sc: Annotated[float, typer.Option(min=0.0, help="Price of an element.")] = 0.3,
     budgets: Annotated[str, typer.Option(help="Refits, separated by commas.")] = "50,100,200,400",
     seconds: Annotated[str, typer.Option(help="Seconds, separated by commas.", show_default="none")] = "",
+    faces: Annotated[str, typer.Option(help="Rule of faces: any (the paper's style), convex or quads.")] = "any",
     limit: Limit = None,
     workers: Workers = 1,
     records: Kept = _RECORDS,
     fresh: Fresh = False,
 ) -> None:
-    """What nFAP-Net and WarpNet add to the search, at equal budgets."""
+    """What networks add to the search at equal budgets, and what an oracle in their place would."""
+    face_rule(faces)
     sets = {"constructions": made("construction", made_each), "objects": made("objects", made_each)}
     if folder is not None:
         sets[folder.name] = _targets(folder, limit)
     bench = _Bench(records, workers, fresh)
     complete = bench.completer("learning")
-    rows = search_rows.learning_rows(complete, sets, w_sc, _numbers(budgets), _times(seconds))
-    bench.show(f"mean r_all with and without networks, w_sc {w_sc:g}", rows)
+    rows = learning_rows(complete, sets, w_sc, _numbers(budgets), _times(seconds), faces)
+    bench.show(f"mean r_all with and without networks, w_sc {w_sc:g}, faces {faces}", rows)
 
 
 def _targets(folder: Path, limit: int | None) -> list[str]:

@@ -19,6 +19,7 @@ from autopoly_env.score import ScoreWeights
 from autopoly_env.silhouette import Silhouette, load_silhouette
 from autopoly_env.simulator import Simulator
 from autopoly_env.targets import make_targets, split_seed
+from benchmarks.foretold import solve_foretold
 from training.parallel import map_tasks
 
 _MADE = ("construction", "objects")  # kinds of targets that are made: KIND:SEED, a seed of the test split
@@ -133,7 +134,7 @@ def best_of_plays(simulator: Simulator, budget: Budget, options: dict[str, Any])
     return max(plays, key=lambda play: play.score.total), n_refits
 
 
-_SOLVERS: dict[str, _Solver] = {"random": best_of_plays}
+_SOLVERS: dict[str, _Solver] = {"random": best_of_plays, "foretold": solve_foretold}
 
 
 @cache

@@ -43,24 +43,6 @@ VARIANTS: dict[str, tuple[Any, ...]] = {
     "hop_patience": (0, 60, 1000),
 }
 
-_TREE_ALONE = {"seeds": [], "hop_patience": 0}
-LEARNERS: dict[str, tuple[str, dict[str, Any]]] = {  # agents and options
-    "mcts, tree alone": ("mcts", _TREE_ALONE),
-    "mcts, tree alone, one by one": ("mcts", _TREE_ALONE | {"n_expanded": 1, "n_simulations": 4}),
-    "nfap-prior, tree alone": ("nfap-prior", _TREE_ALONE),
-    "nfap-mcts": ("nfap-mcts", {}),
-    "mcts": ("mcts", {}),
-    "nfap-prior": ("nfap-prior", {}),
-}
-_PLAIN_OF = {  # whom each of them is held to
-    "mcts, tree alone": None,
-    "mcts, tree alone, one by one": "mcts, tree alone",
-    "nfap-prior, tree alone": "mcts, tree alone, one by one",
-    "nfap-mcts": "mcts, tree alone",
-    "mcts": None,
-    "nfap-prior": "mcts",
-}
-
 Complete = Callable[[Iterable[Case]], Results]  # gets results for cases; those that failed are left out
 OnDone = Callable[[Case, str], None]  # told of each case that is over, and what was wrong with it
 Totals = dict[tuple[str, float, int], Interval]  # (agent, w_sc, refits) -> mean r_all
@@ -73,14 +55,14 @@ def gap_rows(
     agent, targets = "mcts" if faces == "any" else "quads", made("construction", limit)
     best = [with_options(Case(target, "oracle", 1.0, faces=faces), width=width) for target in targets]
     ours = [Case(target, agent, 1.0, refits=refits, faces=faces) for target in targets]
-    reached, found = _totals(best, oracle(best)), _totals(ours, complete(ours))
+    reached, found = totals_of(best, oracle(best)), totals_of(ours, complete(ours))
     both = [target for target in found if target in reached]
     if not both:
         yield not_measured("gap", "there is no shape that both have solved")
         return
     gaps = np.array([reached[target] - found[target] for target in both])
     mean = bootstrap_mean(gaps)
-    first, second = (_mean(totals[target] for target in both) for totals in (found, reached))
+    first, second = (mean_of(totals[target] for target in both) for totals in (found, reached))
     yield Row(f"{agent}, {refits} refits: mean r_all", first, second, note=f"against the oracle of width {width}")
     yield Row("mean gap to the oracle", mean.mean, note=_interval(mean, len(both)))
     worst = both[int(gaps.argmax())]
@@ -131,11 +113,11 @@ def ablation_rows(complete: Complete, targets: Sequence[str], refits: int) -> It
     }
     results = complete(case for cases in (*plain.values(), *changed.values()) for case in cases)
     for w_sc in WEIGHTS:
-        usual = _totals(plain[w_sc], results)
-        yield Row(f"w_sc {w_sc:g}: default", _mean(usual.values()), note=f"mean r_all, {len(usual)} shapes")
+        usual = totals_of(plain[w_sc], results)
+        yield Row(f"w_sc {w_sc:g}: default", mean_of(usual.values()), note=f"mean r_all, {len(usual)} shapes")
         for name, value in variants:
-            totals = _totals(changed[w_sc, name, value], results)
-            yield _against(f"w_sc {w_sc:g}: {name} {_shown(value)}", totals, usual)
+            totals = totals_of(changed[w_sc, name, value], results)
+            yield against(f"w_sc {w_sc:g}: {name} {_shown(value)}", totals, usual)
 
 
 def overhead_rows(targets: Sequence[str], refits: int) -> Iterator[Row]:
@@ -164,10 +146,10 @@ def dominance_rows(complete: Complete, targets: Sequence[str], seconds: float) -
     results = complete(case for those in cases.values() for case in those)
     n_lost = 0
     for w_sc in WEIGHTS:
-        found = _totals(cases["mcts", w_sc], results)
+        found = totals_of(cases["mcts", w_sc], results)
         for rival in RIVALS:
-            theirs = _totals(cases[rival, w_sc], results)
-            yield _against(f"w_sc {w_sc:g}: mcts against {rival}", found, theirs)
+            theirs = totals_of(cases[rival, w_sc], results)
+            yield against(f"w_sc {w_sc:g}: mcts against {rival}", found, theirs)
             for target in found:
                 if target in theirs and found[target] < theirs[target] - LOWER:
                     n_lost += 1
@@ -175,55 +157,22 @@ def dominance_rows(complete: Complete, targets: Sequence[str], seconds: float) -
     yield Row(f"shapes lower by more than {LOWER:g}", float(n_lost), must=NONE_LOST, note="of all the above")
 
 
-def learning_rows(
-    complete: Complete, sets: dict[str, list[str]], w_sc: float, refits: Sequence[int], seconds: Sequence[float]
-) -> Iterator[Row]:
-    """What the networks add at equal budgets, for each set of targets; `mcts` without them is what they are held to."""
-    budgets: list[dict[str, Any]] = [*({"refits": n} for n in refits), *({"seconds": n} for n in seconds)]
-    last = len(refits) - 1
-    keys = [
-        (name, n, who)
-        for name in sets
-        for n in range(len(budgets))
-        for who in LEARNERS
-        if n == last or LEARNERS[who][0] != "nfap-mcts"  # which takes a refit a step and ends by itself
-    ]
-    cases = {
-        (name, n, who): [
-            with_options(Case(target, LEARNERS[who][0], w_sc, **budgets[n]), **LEARNERS[who][1])
-            for target in sets[name]
-        ]
-        for name, n, who in keys
-    }
-    results = complete(case for those in cases.values() for case in those)
-    for name in sets:
-        for n, budget in enumerate(budgets):
-            [(unit, amount)] = budget.items()
-            found = {who: _totals(cases[name, n, who], results) for who in LEARNERS if (name, n, who) in cases}
-            for who, plain in ((who, plain) for who, plain in _PLAIN_OF.items() if who in found):
-                label = f"{name}, {amount:g} {unit}: {who}"
-                if plain is None:
-                    yield Row(label, _mean(found[who].values()), note=f"mean r_all, {len(found[who])} shapes")
-                else:
-                    yield _against(label, found[who], found[plain])
-
-
-def _totals(cases: Sequence[Case], results: Results) -> dict[str, float]:
+def totals_of(cases: Sequence[Case], results: Results) -> dict[str, float]:
     """r_all by target."""
     return {case.target: results[case].total for case in cases if case in results}
 
 
-def _against(name: str, ours: dict[str, float], others: dict[str, float]) -> Row:
+def against(name: str, ours: dict[str, float], others: dict[str, float]) -> Row:
     """Both means over the shapes that both have, and the interval of their difference."""
     both = [target for target in ours if target in others]
     if not both:
         return not_measured(name, "there is no shape that both have solved")
     lead = bootstrap_mean(np.array([ours[target] - others[target] for target in both]))
-    first, second = (_mean(totals[target] for target in both) for totals in (ours, others))
+    first, second = (mean_of(totals[target] for target in both) for totals in (ours, others))
     return Row(name, first, second, note=f"{lead.mean:+.2f}, 95 %: {lead.low:+.2f} to {lead.high:+.2f}")
 
 
-def _mean(values: Iterable[float]) -> float:
+def mean_of(values: Iterable[float]) -> float:
     numbers: FloatArray = np.fromiter(values, np.float64)
     return float(numbers.mean()) if numbers.size else float("nan")
 

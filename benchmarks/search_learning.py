@@ -1,0 +1,82 @@
+"""What networks add to the search, at equal budgets, and the most that they could: the rows of `learning`."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from benchmarks.foretold import ONE_BY_ONE, TREE_ALONE
+from benchmarks.report import Row
+from benchmarks.search_cases import Case, with_options
+from benchmarks.search_rows import Complete, against, mean_of, totals_of
+
+LONG = 3000  # refits of a long search of a whole agent
+TOLD = 1000  # refits of each of the trees that tell an oracle
+
+
+@dataclass(frozen=True)
+class Learner:
+    """Who searches, and whom he is held to."""
+
+    agent: str
+    options: dict[str, Any] = field(default_factory=dict)
+    plain: str = ""  # name of the other; empty where it is he whom others are held to
+    ends_by_itself: bool = False  # and so is asked with the largest budget only
+
+
+_TREE, _BY_ONE, _TOLD = "mcts, tree alone", "mcts, tree alone, one by one", "oracle prior, tree alone"
+_OURS = {
+    _TREE: Learner("mcts", TREE_ALONE),
+    _BY_ONE: Learner("mcts", ONE_BY_ONE, _TREE),
+    _TOLD: Learner("foretold", {"long": TOLD}, _BY_ONE),
+}
+PAPER = _OURS | {
+    "nfap-prior, tree alone": Learner("nfap-prior", TREE_ALONE, _BY_ONE),
+    "nfap-mcts": Learner("nfap-mcts", {}, _TREE, ends_by_itself=True),
+    "mcts": Learner("mcts"),
+    "nfap-prior": Learner("nfap-prior", {}, "mcts"),
+    "oracle prior, whole agent": Learner("foretold", {"long": TOLD, "whole": True}, "mcts"),
+}
+MODELLER = _OURS | {
+    "quads": Learner("quads"),
+}
+
+
+def learning_rows(
+    complete: Complete,
+    sets: dict[str, list[str]],
+    w_sc: float,
+    refits: Sequence[int],
+    seconds: Sequence[float],
+    faces: str = "any",
+) -> Iterator[Row]:
+    """For each set of targets; under a rule of faces in the modeller's style, else in the paper's.
+
+    The last rows of a set are what whole agents find in `LONG` refits: no prior is better than knowing that.
+    """
+    learners = PAPER if faces == "any" else MODELLER
+    budgets: list[dict[str, Any]] = [*({"refits": n} for n in refits), *({"seconds": n} for n in seconds)]
+    cases = {
+        (name, n, who): [
+            with_options(Case(target, learner.agent, w_sc, **budgets[n], faces=faces), **learner.options)
+            for target in sets[name]
+        ]
+        for name in sets
+        for n in range(len(budgets))
+        for who, learner in learners.items()
+        if n == len(refits) - 1 or not learner.ends_by_itself
+    }
+    whole = "mcts" if faces == "any" else "quads"
+    longest = {name: [Case(target, whole, w_sc, refits=LONG, faces=faces) for target in sets[name]] for name in sets}
+    results = complete(case for those in (*cases.values(), *longest.values()) for case in those)
+    for name in sets:
+        for n, budget in enumerate(budgets):
+            [(unit, amount)] = budget.items()
+            found = {who: totals_of(cases[name, n, who], results) for who in learners if (name, n, who) in cases}
+            for who, reached in found.items():
+                label, plain = f"{name}, {amount:g} {unit}: {who}", learners[who].plain
+                if plain:
+                    yield against(label, reached, found[plain])
+                else:
+                    yield Row(label, mean_of(reached.values()), note=f"mean r_all, {len(reached)} shapes")
+            label = f"{name}, {amount:g} {unit}: what {whole} finds in {LONG:,} refits"
+            yield against(label, totals_of(longest[name], results), found[whole])
