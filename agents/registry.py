@@ -66,6 +66,13 @@ def _nfap_prior() -> AgentEntry:
     return AgentEntry("nfap-prior", lambda config: nfap_prior(config, _seeds(config.seeds)), NfapPriorConfig())
 
 
+def _choice_prior() -> AgentEntry:
+    from agents.choice.agent import choice_prior
+    from agents.choice.config import ChoicePriorConfig
+
+    return AgentEntry("choice-prior", lambda config: choice_prior(config, _seeds(config.seeds)), ChoicePriorConfig())
+
+
 def _nfap_mcts() -> AgentEntry:
     from agents.guided.agent import nfap_mcts
     from agents.guided.config import NfapMctsConfig
@@ -120,6 +127,7 @@ AGENTS: MutableMapping[str, AgentEntry] = _Entries(
         "mcts_paper": _mcts_paper,
         "nfap-prior": _nfap_prior,
         "nfap-mcts": _nfap_mcts,
+        "choice-prior": _choice_prior,
         **{name: partial(_policy, name) for name in ("ppo", "maskable-ppo", "a2c", "dqn")},
         "rl-prior": _rl_prior,
         "oracle": partial(_class, "baselines.oracle:OracleAgent", "oracle"),

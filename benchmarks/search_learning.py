@@ -21,23 +21,33 @@ class Learner:
     options: dict[str, Any] = field(default_factory=dict)
     plain: str = ""  # name of the other; empty where it is he whom others are held to
     ends_by_itself: bool = False  # and so is asked with the largest budget only
+    takes_what_it_needs: bool = False  # the same without any budget
 
 
 _TREE, _BY_ONE, _TOLD = "mcts, tree alone", "mcts, tree alone, one by one", "oracle prior, tree alone"
+_CHOICE = ONE_BY_ONE | {"n_simulations": 8}  # as `choice-prior` has it
+_ONE_PASS = TREE_ALONE | {"n_simulations": 1}
 _OURS = {
     _TREE: Learner("mcts", TREE_ALONE),
     _BY_ONE: Learner("mcts", ONE_BY_ONE, _TREE),
+    f"{_BY_ONE}, 8 a step": Learner("mcts", _CHOICE, _TREE),
     _TOLD: Learner("foretold", {"long": TOLD}, _BY_ONE),
+    "choice-prior, tree alone": Learner("choice-prior", TREE_ALONE, f"{_BY_ONE}, 8 a step"),
+    "choice-prior, tree alone, on the plain tree": Learner("choice-prior", TREE_ALONE, _TREE),
 }
 PAPER = _OURS | {
     "nfap-prior, tree alone": Learner("nfap-prior", TREE_ALONE, _BY_ONE),
     "nfap-mcts": Learner("nfap-mcts", {}, _TREE, ends_by_itself=True),
     "mcts": Learner("mcts"),
     "nfap-prior": Learner("nfap-prior", {}, "mcts"),
+    "choice-prior": Learner("choice-prior", {}, "mcts"),
     "oracle prior, whole agent": Learner("foretold", {"long": TOLD, "whole": True}, "mcts"),
 }
 MODELLER = _OURS | {
+    "beam, as long as it takes": Learner("beam", {"width": 8}, takes_what_it_needs=True, ends_by_itself=True),
+    "choice-prior, one pass": Learner("choice-prior", _ONE_PASS, "beam, as long as it takes", ends_by_itself=True),
     "quads": Learner("quads"),
+    "choice-prior": Learner("choice-prior", {}, "quads"),
 }
 
 
@@ -57,7 +67,10 @@ def learning_rows(
     budgets: list[dict[str, Any]] = [*({"refits": n} for n in refits), *({"seconds": n} for n in seconds)]
     cases = {
         (name, n, who): [
-            with_options(Case(target, learner.agent, w_sc, **budgets[n], faces=faces), **learner.options)
+            with_options(
+                Case(target, learner.agent, w_sc, faces=faces, **({} if learner.takes_what_it_needs else budgets[n])),
+                **learner.options,
+            )
             for target in sets[name]
         ]
         for name in sets

@@ -16,8 +16,9 @@ Floor = dict[str, str]  # a room's name, what is in it
 # The highest floor first, a line each. Folders are rooms, and so are files that lie in no folder.
 TABLES = {
     "training": """
-        evaluate | compare | make_dataset | make_expert | train_nfap | train_warpnet | rl_clone | train_rl
+        evaluate | compare | improve | make_dataset | make_expert | train_nfap | train_warpnet | rl_clone | train_rl
         describe_networks | evaluation: agents on suites | policies: training of policies, by playing
+        improvement: a search teaches a network, round by round
         report: the page that compares runs | datasets: targets on disk | networks: training of networks
         records: what was measured | run_log: of a training | telling: signs of life, tables
         parallel: processes, Ray | options: settings
@@ -26,6 +27,7 @@ TABLES = {
         solve | vary | retarget | export | studio: a page in the browser, its server, its workers
         commands: what commands share: progress, results, Ctrl-C, wishes
         registry: agents by name; from outside by my.module:Agent
+        choice: ChoiceNet, a prior in NumPy that search has taught
         guided: nFAP-Net and WarpNet in the search | rl: policies: observation, network, environments
         search: Monte Carlo tree search; mcts, the default | warm: kernels of agents
         quads: convex quads, told as they are modelled
@@ -34,7 +36,8 @@ TABLES = {
         base: what every agent is: act and solve
         finish: states become a solution: pared, polished, told without detours
         budget: refits, seconds, simulations
-        solution: what comes out | options: YAML, key=value | weights_file: of networks | names | extras
+        solution: what comes out | options: YAML, key=value | weights_file: of networks, in torch
+        weights_meta: what stands beside weights | names | extras
     """,
     "autopoly_env": """
         vector_env: many at once | wrappers: other observations | warm: compiles all kernels

@@ -10,7 +10,8 @@ from torch import nn
 from agents.guided.config import NfapConfig, WarpConfig
 from agents.guided.nfap import NfapNet
 from agents.guided.warp import WarpNet
-from agents.weights_file import WeightsMeta, fill, read_meta, read_tensors, settings_of, write_weights
+from agents.weights_file import fill, read_tensors, write_weights
+from agents.weights_meta import WeightsMeta, read_meta, settings_of
 from autopoly_env.errors import ConfigError
 
 SHIPPED = Path(__file__).parent / "weights"

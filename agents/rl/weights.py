@@ -9,7 +9,8 @@ from pydantic import AliasChoices, Field
 
 from agents.rl.config import ALGORITHMS, NetConfig, SpaceSpec
 from agents.rl.network import MeshNet
-from agents.weights_file import WeightsMeta, fill, read_meta, read_tensors, settings_of, write_weights
+from agents.weights_file import fill, read_tensors, write_weights
+from agents.weights_meta import WeightsMeta, read_meta, settings_of
 from autopoly_env.errors import ConfigError
 
 SHIPPED = Path(__file__).parent / "weights"

@@ -19,7 +19,7 @@ class MctsConfig:
     n_expanded: int = 4  # children made at once, the most promising first
     widening: float = 0.5  # a node has at most n_expanded * visits ** widening children; 1 is no limit
     n_rollout: int = 0  # steps of a roll-out, the paper's N_sim
-    value: Literal["best", "final", "discounted"] = "best"  # of a leaf and its roll-out
+    value: Literal["best", "final", "discounted", "foreseen"] = "best"  # of a leaf and its roll-out, or its evaluator's
     discount: float = 1.0  # per step, of what is backed up and of value "discounted"
     backup: Literal["max", "mean"] = "max"
     commit: Literal["value", "visits"] = "value"  # of the root children, the one that has most is taken

@@ -1,4 +1,4 @@
-"""`Evaluator`: what the search is told about states - which actions are promising, and how they are carried out."""
+"""`Evaluator`: what the search is told about states: promising actions, how they are carried out, what may come."""
 
 from collections.abc import Sequence
 from typing import Protocol
@@ -22,6 +22,10 @@ class Evaluator(Protocol):
         """The states after the actions, in their order; those without room left out."""
         ...
 
+    def foresee(self, simulator: Simulator, states: Sequence[State]) -> FloatArray:
+        """The r_all (S,) that is to be expected from each state on."""
+        ...
+
 
 class UniformEvaluator:
     """The paper's search without learning: all actions alike, exact refits."""
@@ -31,6 +35,10 @@ class UniformEvaluator:
 
     def expand(self, simulator: Simulator, state: State, actions: Sequence[Action]) -> list[State]:
         return simulator.transition_all(state, actions)
+
+    def foresee(self, simulator: Simulator, states: Sequence[State]) -> FloatArray:
+        """What they are worth as they are."""
+        return np.array([state.score.total for state in states], float)
 
 
 class ResidualEvaluator(UniformEvaluator):

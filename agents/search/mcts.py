@@ -115,7 +115,7 @@ class MctsAgent(Agent):
     def _search(self, simulator: Simulator, track: Track, meter: Meter) -> Iterator[Track]:
         """Search, commit, and so on; yield every track that is the best so far."""
         rng = np.random.default_rng(self._config.seed)
-        root, best_total, failures = Node(track), track.state.score.total, 0
+        root, best_total, failures = self._plant(track), track.state.score.total, 0
         while not root.track.state.done and failures < self._config.patience and not meter.spent():
             search = Search(simulator, self._evaluator, self._config, rng, root)
             failures += 1
@@ -127,7 +127,11 @@ class MctsAgent(Agent):
             if chosen is None:
                 return
             chosen.parent = None
-            root = chosen if self._config.reuse_tree else Node(chosen.track)
+            root = chosen if self._config.reuse_tree else self._plant(chosen.track)
+
+    def _plant(self, track: Track) -> Node:
+        """The root of a new tree."""
+        return Node(track)
 
 
 @dataclass

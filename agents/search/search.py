@@ -80,6 +80,11 @@ class Search:
         children = yield from self._expand(node, meter)
         if not children:
             back_up(node, node.total, self._seen, self._config.discount)
+        if self._config.value == "foreseen":
+            foreseen = self._evaluator.foresee(self._simulator, [child.track.state for child in children])
+            for child, value in zip(children, foreseen, strict=True):
+                back_up(child, float(value), self._seen, self._config.discount)
+            return
         for child in children:
             n_before = self._simulator.n_refits
             played = roll_out(self._simulator, self._evaluator, child.track, self._config.n_rollout, self._rng)

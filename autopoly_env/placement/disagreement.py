@@ -27,9 +27,10 @@ class Disagreement:
 
     def __init__(self, mesh: PolyMesh, silhouette: Silhouette) -> None:
         self.mesh = mesh
-        covered = np.minimum(coverage(mesh, RESOLUTION), 1.0)
+        self.covered: FloatArray = np.minimum(coverage(mesh, RESOLUTION), 1.0)
         target = silhouette.target(RESOLUTION)
-        self.difference: FloatArray = target.coverage - covered
+        self.target: FloatArray = target.coverage
+        self.difference: FloatArray = self.target - self.covered
         if target.weights is None:
             self.labels, self.n_regions = blame_kernels.regions_of(self.difference, THRESHOLD)
         else:  # pixels of weight 0 do not disagree, the others count as much as they weigh

@@ -16,12 +16,13 @@ from agents.solution import Solution
 from autopoly_env.errors import ConformanceError
 from autopoly_env.operators import STOP, Action
 from autopoly_env.simulator import Simulator, State
+from tests.helpers.choosing import saved_choice
 from tests.helpers.networks import saved_networks, saved_policy
 from tests.helpers.solving import TARGETS, assert_consistent, quick, simulator
 
 POLICIES = ("ppo", "maskable-ppo", "a2c", "dqn")
 AT_HOME = {"quads": ("modeller",)}  # operators that an agent needs
-WITH_NETWORKS = ("nfap-prior", "nfap-mcts", "rl-prior", *POLICIES)
+WITH_NETWORKS = ("nfap-prior", "nfap-mcts", "choice-prior", "rl-prior", *POLICIES)
 
 
 @pytest.fixture(scope="module")
@@ -34,6 +35,7 @@ def options(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any
     return {
         "nfap-prior": {**nfap, "seeds": (), "hop_patience": 1},
         "nfap-mcts": {**nfap, "warpnet_weights": networks["warpnet"]},
+        "choice-prior": {"weights": saved_choice(folder), "seeds": (), "hop_patience": 1, **few},
         "rl-prior": {**weights, **few},
         **dict.fromkeys(POLICIES, weights),
     }

@@ -13,7 +13,7 @@ from benchmarks.search_cases import Case, Found, Results
 from benchmarks.search_learning import LONG, MODELLER, PAPER, learning_rows
 from tests.helpers.solving import simulator
 
-TOTALS = {"mcts": 70.0, "foretold": 75.0, "quads": 80.0, "nfap-prior": 71.0, "nfap-mcts": 69.0}
+TOTALS = {"mcts": 70.0, "foretold": 75.0, "quads": 80.0, "nfap-prior": 71.0, "nfap-mcts": 69.0, "beam": 74.0}
 
 
 def known(cases: Iterable[Case]) -> Results:
