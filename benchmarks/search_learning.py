@@ -25,14 +25,15 @@ class Learner:
 
 
 _TREE, _BY_ONE, _TOLD = "mcts, tree alone", "mcts, tree alone, one by one", "oracle prior, tree alone"
-_CHOICE = ONE_BY_ONE | {"n_simulations": 8}  # as `choice-prior` has it
+_CHOICE = ONE_BY_ONE | {"n_simulations": 8, "exploration": 1.0}  # as `choice-prior` has it
+_SAME = "mcts, tree alone, as choice-prior"
 _ONE_PASS = TREE_ALONE | {"n_simulations": 1}
 _OURS = {
     _TREE: Learner("mcts", TREE_ALONE),
     _BY_ONE: Learner("mcts", ONE_BY_ONE, _TREE),
-    f"{_BY_ONE}, 8 a step": Learner("mcts", _CHOICE, _TREE),
+    _SAME: Learner("mcts", _CHOICE, _TREE),
     _TOLD: Learner("foretold", {"long": TOLD}, _BY_ONE),
-    "choice-prior, tree alone": Learner("choice-prior", TREE_ALONE, f"{_BY_ONE}, 8 a step"),
+    "choice-prior, tree alone": Learner("choice-prior", TREE_ALONE, _SAME),
     "choice-prior, tree alone, on the plain tree": Learner("choice-prior", TREE_ALONE, _TREE),
 }
 PAPER = _OURS | {
@@ -65,19 +66,7 @@ def learning_rows(
     """
     learners = PAPER if faces == "any" else MODELLER
     budgets: list[dict[str, Any]] = [*({"refits": n} for n in refits), *({"seconds": n} for n in seconds)]
-    cases = {
-        (name, n, who): [
-            with_options(
-                Case(target, learner.agent, w_sc, faces=faces, **({} if learner.takes_what_it_needs else budgets[n])),
-                **learner.options,
-            )
-            for target in sets[name]
-        ]
-        for name in sets
-        for n in range(len(budgets))
-        for who, learner in learners.items()
-        if n == len(refits) - 1 or not learner.ends_by_itself
-    }
+    cases = cases_of(learners, sets, w_sc, budgets, len(refits) - 1, faces)
     whole = "mcts" if faces == "any" else "quads"
     longest = {name: [Case(target, whole, w_sc, refits=LONG, faces=faces) for target in sets[name]] for name in sets}
     results = complete(case for those in (*cases.values(), *longest.values()) for case in those)
@@ -93,3 +82,27 @@ def learning_rows(
                     yield Row(label, mean_of(reached.values()), note=f"mean r_all, {len(reached)} shapes")
             label = f"{name}, {amount:g} {unit}: what {whole} finds in {LONG:,} refits"
             yield against(label, totals_of(longest[name], results), found[whole])
+
+
+def cases_of(
+    learners: dict[str, Learner],
+    sets: dict[str, list[str]],
+    w_sc: float,
+    budgets: Sequence[dict[str, Any]],
+    last: int,
+    faces: str,
+) -> dict[tuple[str, int, str], list[Case]]:
+    """By set, number of the budget and learner; `last`: the budget of those that end by themselves."""
+    return {
+        (name, n, who): [
+            with_options(
+                Case(target, learner.agent, w_sc, faces=faces, **({} if learner.takes_what_it_needs else budgets[n])),
+                **learner.options,
+            )
+            for target in sets[name]
+        ]
+        for name in sets
+        for n in range(len(budgets))
+        for who, learner in learners.items()
+        if n == last or not learner.ends_by_itself
+    }

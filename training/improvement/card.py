@@ -11,17 +11,17 @@ from agents.choice.weights import SHIPPED, load_choice, save_choice
 from autopoly_env.files import write_atomically
 
 
-def export_choice(path: Path, command: str, hours: str = "") -> Path:
+def export_choice(path: Path, command: str) -> Path:
     """Put weights and card where the agent `choice-prior` looks for them; returns the folder."""
     weights = load_choice(path)
     meta = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
     save_choice(SHIPPED / "choice.safetensors", weights.config, weights.tensors, meta["training"], meta["metrics"])
     n_numbers = sum(int(np.size(tensor)) for tensor in weights.tensors.values())
-    write_atomically(SHIPPED / "choice.md", _card(n_numbers, meta, command, hours))
+    write_atomically(SHIPPED / "choice.md", _card(n_numbers, meta, command))
     return SHIPPED
 
 
-def _card(n_numbers: int, meta: Mapping[str, Any], command: str, hours: str) -> str:
+def _card(n_numbers: int, meta: Mapping[str, Any], command: str) -> str:
     training = meta["training"]
     played, compared, config = training["play"], training["compare"], meta["config"]
     rows = "\n".join(f"| {name} | {value:.4g} |" for name, value in meta["metrics"].items())
@@ -32,14 +32,15 @@ ChoiceNet: from a state's legal actions and the picture around each to how promi
 add to the state. {n_numbers} parameters, NumPy alone.
 
 **Knows.** Rules of faces {", ".join(config["rules"])}; prices w_sc {config["w_sc"][0]:g} to {config["w_sc"][1]:g};
-classes of actions {", ".join(config["classes"])}.
+what {", ".join(config["classes"])} do.
 
-**Data.** {training["round"]} rounds, the first of {played["n_first"]} plays and each other of {played["n_plays"]}; a
-play is the best of {played["n_runs"]} tree searches of {played["refits"]} refits, {played["modeller"]:.0%} in the
-modeller's style, the others in the paper's. Targets are made by `autopoly_env.targets`, held-out ones from seeds that
-training never draws. No picture from outside was used.
+**Data.** Round {training["round"]} of those below; the first has {played["n_first"]} plays, each other
+{played["n_plays"]}. A play is the best of {played["n_runs"]} tree searches of {played["refits"]} refits,
+{played["modeller"]:.0%} in the modeller's style, the others in the paper's. Targets are made by `autopoly_env.targets`,
+held-out ones from seeds that training never draws. No picture from outside was used.
 
-**Command.** `{command}`, seed {training["run"]["seed"]}.{hours}
+**Command.** `{command}`, seed {training["run"]["seed"]}. A play takes about two seconds of one core, learning of a
+round a minute and a half, a comparison a quarter of a minute.
 
 **Rounds**, on {compared["n_targets"]} held-out targets, the tree alone with {compared["refits"]} refits
 
