@@ -25,9 +25,9 @@ class Learner:
 
 
 _TREE, _BY_ONE, _TOLD = "mcts, tree alone", "mcts, tree alone, one by one", "oracle prior, tree alone"
-_CHOICE = ONE_BY_ONE | {"n_simulations": 8, "exploration": 1.0, "broader": True}  # as `choice-prior` has it
+_CHOICE = ONE_BY_ONE | {"n_simulations": 8, "exploration": 1.0}  # as `choice-prior` has it
 _SAME = "mcts, tree alone, as choice-prior"
-_ONE_PASS = TREE_ALONE | {"n_simulations": 1, "broader": False}
+_ONE_PASS = TREE_ALONE | {"n_simulations": 1}
 _OURS = {
     _TREE: Learner("mcts", TREE_ALONE),
     _BY_ONE: Learner("mcts", ONE_BY_ONE, _TREE),

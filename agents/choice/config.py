@@ -43,7 +43,6 @@ class ChoicePriorConfig(MctsConfig):
     n_simulations: int = 8
     n_expanded: int = 1
     exploration: float = 1.0  # a step that does not pay yet is gone on from where the prior likes it
-    broader: bool = True
     tree_share: float = 0.5
     prior: Literal["choice"] = "choice"  # type: ignore[assignment]
     weights: str = ""  # a .safetensors file; empty for the one that comes with the project

@@ -26,7 +26,6 @@ class MctsConfig:
     halving: bool = False  # sequential halving at the root
     reuse_tree: bool = True  # keep what is below the child that is taken
     merge: bool = True  # do not go on from a shape that the tree has already
-    broader: bool = False  # what a tree leaves of its budget goes to a second one, with the default's breadth
     patience: int = 4  # committed steps in a row that may fail to improve the best shape
     tree_share: float = 0.25  # of what the seeds leave of the budget, that a tree may use at most where hops follow
     hop_patience: int = 60  # hops in a row, from outline to outline, that may; 0: the search ends with the tree

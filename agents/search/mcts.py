@@ -5,7 +5,7 @@ it begins at the best shape that other agents have found, and again at the recta
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -99,9 +99,8 @@ class MctsAgent(Agent):
     def _search_all(self, simulator: Simulator, finds: "_Finds", meter: Meter, initial: Track) -> None:
         for start in [initial] if finds.best is initial else [finds.best, initial]:
             part = meter.part(1.0 if finds.tops is None else self._config.tree_share)
-            for agent in [self, self._broader()] if self._config.broader else [self]:
-                for track in agent._search(simulator, start, part):
-                    finds.offer(simulator, track)
+            for track in self._search(simulator, start, part):
+                finds.offer(simulator, track)
         if finds.tops is not None:
             for mesh in (finds.best.state.mesh, *(solution.mesh for solution in finds.incumbents)):
                 finds.tops.add_mesh(mesh)
@@ -129,12 +128,6 @@ class MctsAgent(Agent):
                 return
             chosen.parent = None
             root = chosen if self._config.reuse_tree else self._plant(chosen.track)
-
-    def _broader(self) -> "MctsAgent":
-        """The same with the default's breadth: a tree that trusts its prior less."""
-        usual = MctsConfig()
-        config = replace(self._config, n_expanded=usual.n_expanded, n_simulations=usual.n_simulations)
-        return MctsAgent(replace(config, exploration=usual.exploration), (), self._evaluator)
 
     def _plant(self, track: Track) -> Node:
         """The root of a new tree."""

@@ -49,17 +49,6 @@ def test_seed__changes_the_order_of_equals() -> None:
     assert len({agent.solve(simulator("blobs"), Budget(refits=60)).sequence.to_json() for agent in agents}) > 1
 
 
-def test_broader_tree__has_what_the_first_leaves() -> None:
-    hasty = {"seeds": (), "hop_patience": 0, "n_expanded": 1, "n_simulations": 1, "patience": 1}
-    for target in ("frame", "island"):
-        alone, followed = (
-            make_agent("mcts", **hasty, broader=broader).solve(simulator(target), Budget(refits=200))
-            for broader in (False, True)
-        )
-        assert alone.stats.stopped_by == "finished" and followed.stats.n_refits > alone.stats.n_refits
-        assert followed.score.total >= alone.score.total and followed.stats.n_refits < 240
-
-
 @pytest.mark.parametrize("name", ["mcts", "mcts_paper"])
 def test_budget__of_nothing_returns_the_rectangle(name: str) -> None:
     game = simulator("blobs")
