@@ -13,6 +13,7 @@ AGENT_NAMES = (
         "mcts_paper",
         "nfap-prior",
         "nfap-mcts",
+        "choice-prior",
     ),
     *("ppo", "maskable-ppo", "a2c", "dqn", "rl-prior", "oracle", "dr-simple", "dr-complex"),
 )

@@ -74,7 +74,7 @@ def test_our_agents__report_what_the_simulator_has_counted(name: str) -> None:
 
 
 def test_step_without_room__is_idle_and_its_refits_count(monkeypatch: pytest.MonkeyPatch) -> None:
-    game = simulator("house")
+    game = simulator("blobs")
     real: Callable[[State, Action], State] = game.transition
     tried = []
 

@@ -51,12 +51,12 @@ def clone_config(shards: Path, *overrides: str) -> CloneConfig:
         f"data.shards={shards}",
         f"data.held_out={shards}",
         "data.n_held_out=8",
-        "optim.n_steps=40",
+        "optim.n_steps=160",
         "optim.batch_size=16",
         "optim.warmup=2",
         "optim.lr=0.01",
         "run.n_workers=0",
-        "run.eval_every=20",
+        "run.eval_every=80",
         "n_exam=1",
     ]
     return read_config(None, [*given, *overrides], CloneConfig())
