@@ -127,6 +127,8 @@ def _read_stream(stream: IO[bytes], name: str, label: str) -> Iterator[Picture]:
         image = drawing
     except Exception as error:  # a damaged header makes Pillow's readers raise almost anything
         raise _undecodable(label, error) from error
+    if image.format == "EPS":  # a program in PostScript, which Pillow would have Ghostscript run
+        raise SilhouetteError(f"{label} is PostScript, which is not run here: export it as PNG or SVG")
     yield _read_pillow(image, name, label)
     for number in range(1, min(_n_frames(image), MAX_FRAMES)):
         try:

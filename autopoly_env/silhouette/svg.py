@@ -1,7 +1,12 @@
-"""SVG drawings as pictures: drawn by resvg (the extra `svg`), which is never shown a reference to anything outside."""
+"""SVG drawings as pictures: drawn by resvg (the extra `svg`), which is never shown a reference to anything outside.
+
+It draws in a process of its own, for there are drawings that it crashes on, which no exception tells.
+"""
 
 import io
 import re
+import subprocess
+import sys
 import zlib
 from collections.abc import Iterator
 from typing import IO
@@ -13,6 +18,18 @@ from autopoly_env.errors import ConfigError, SilhouetteError
 
 SIDE = 1024  # pixels of the longer side
 MAX_BYTES = 32_000_000  # of a drawing, unpacked
+PATIENCE = 60.0  # seconds that a drawing may take
+DRAWING = """
+import sys
+from resvg_py import svg_to_bytes
+width, height, has_text = map(int, sys.argv[1:])
+text = sys.stdin.buffer.read().decode("utf-8-sig")
+try:
+    drawn = svg_to_bytes(svg_string=text, skip_system_fonts=not has_text, width=width or None, height=height or None)
+except BaseException as error:  # resvg's panics are no Exceptions
+    sys.exit(str(error) or type(error).__name__)
+sys.stdout.buffer.write(bytes(drawn))
+"""
 EMBEDDED = re.compile(r"data:image/(png|jpe?g|gif|webp)[;,]", re.IGNORECASE)
 STYLESHEET = re.compile(rb"""<\?xml-stylesheet\b[^>]*?\bhref\s*=\s*["']([^"'#][^"']*)""")
 URL = re.compile(r"""url\(\s*["']?\s*([^"')]*)""", re.IGNORECASE)
@@ -40,24 +57,31 @@ def read(stream: IO[bytes], label: str) -> Image.Image | None:
             f"{label} refers to {shown!r}, which is not followed; embed what it shows, or export a PNG"
         )
     try:
-        from resvg_py import svg_to_bytes
+        import resvg_py  # noqa: F401
     except ImportError:
         advice = "pip install -e '.[svg]' in the checkout, or export it as PNG"
         raise ConfigError(
             f"{label} is SVG, which needs the package resvg_py, which is not installed: {advice}"
         ) from None
-    width, height = (SIDE, None) if _is_wide(root) else (None, SIDE)
+    return Image.open(io.BytesIO(_drawn(data, root, label)))
+
+
+def _drawn(data: bytes, root: ElementTree.Element, label: str) -> bytes:
+    """The PNG that resvg makes of a drawing. Raises SilhouetteError, also where it crashes or comes to no end."""
+    size = (SIDE, 0) if _is_wide(root) else (0, SIDE)
     has_text = any(_local(element.tag) == "text" for element in root.iter())
+    command = [sys.executable, "-I", "-c", DRAWING, *map(str, size), str(int(has_text))]
+    reason = f"it takes more than {PATIENCE:g} seconds"
     try:
-        drawn = svg_to_bytes(
-            svg_string=data.decode("utf-8-sig"), skip_system_fonts=not has_text, width=width, height=height
-        )
-    except BaseException as error:  # resvg's panics are no Exceptions
-        if isinstance(error, KeyboardInterrupt | SystemExit):
-            raise
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise SilhouetteError(f"{label} cannot be drawn ({reason}); expected valid SVG: export it as PNG") from None
-    return Image.open(io.BytesIO(bytes(drawn)))
+        done = subprocess.run(command, input=data, capture_output=True, timeout=PATIENCE)
+    except subprocess.TimeoutExpired:
+        pass
+    else:
+        if done.returncode == 0:
+            return done.stdout
+        said = done.stderr.decode("utf-8", "replace").split()
+        reason = " ".join(said) if done.returncode == 1 and said else "its renderer crashes"
+    raise SilhouetteError(f"{label} cannot be drawn ({reason}); expected valid SVG: export it as PNG")
 
 
 def _unpacked(data: bytes) -> bytes:

@@ -16,7 +16,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
-from PIL import Image, ImageFilter, ImageOps
+from PIL import EpsImagePlugin, Image, ImageFilter, ImageOps
 
 from autopoly_env.errors import ConfigError, SilhouetteError
 from autopoly_env.silhouette import IMAGE_SUFFIXES, ObjectOptions, Silhouette, Target, find_images, load_silhouette
@@ -527,3 +527,13 @@ def test_find_images__names_what_gave_no_image(tmp_path: Path) -> None:
         with pytest.raises(SilhouetteError) as caught:
             find_images([path])
         assert repr(str(path)) in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_postscript__is_a_program_and_never_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    def run(*_: object) -> None:
+        raise AssertionError("Ghostscript was called")
+
+    monkeypatch.setattr(EpsImagePlugin, "Ghostscript", run)
+    eps = b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 100 100\n%%EndComments\nshowpage\n"
+    with pytest.raises(SilhouetteError, match="PostScript, which is not run here"):
+        load_silhouette(io.BytesIO(eps))

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from autopoly_env.errors import ConfigError, SilhouetteError
-from autopoly_env.silhouette import find_images, load_silhouette
+from autopoly_env.silhouette import find_images, load_silhouette, svg
 
 HEAD = '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" viewBox="0 0 64 32">'
 SQUARE = '<path d="M8 8h16v16H8z"/>'
@@ -92,6 +92,20 @@ def test_svg__that_would_unpack_to_gigabytes_or_expand_entities_is_refused() -> 
 def test_svg__that_is_broken_is_refused_in_one_line() -> None:
     with pytest.raises(SilhouetteError, match="no valid SVG"):
         load_silhouette(io.BytesIO(HEAD.encode()))
+
+
+def test_svg__that_crashes_its_renderer_ends_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("resvg_py")
+    monkeypatch.setattr(svg, "DRAWING", "import os; os.abort()")
+    with pytest.raises(SilhouetteError, match="its renderer crashes"):
+        load_silhouette(drawing(SQUARE))
+
+
+def test_svg__that_does_not_come_to_an_end_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("resvg_py")
+    monkeypatch.setattr(svg, "PATIENCE", 0.0)
+    with pytest.raises(SilhouetteError, match="it takes more than 0 seconds"):
+        load_silhouette(drawing(SQUARE))
 
 
 def test_svg__without_its_renderer_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
