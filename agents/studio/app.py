@@ -64,7 +64,7 @@ def app_of(studio: Studio) -> Starlette:
     handlers: Any = {
         NoItemError: _told(404),
         AutoPolyError: _told(422),
-        uploads.TooLargeError: _told(413, f"That is too large: at most {uploads.MOST_BYTES // 1_000_000} MB a file."),
+        uploads.TooLargeError: _told(413),
         ClientDisconnect: _told(400, "The connection ended before all had come."),
         HTTPException: lambda _, error: PlainTextResponse(f"{error.detail}\n", error.status_code),
         Exception: lambda _, error: PlainTextResponse(f"{described(error)}\n", 500),
@@ -81,6 +81,7 @@ class _Pages:
 
     def __init__(self, studio: Studio) -> None:
         self._studio = studio
+        self._editing = asyncio.Lock()
         self._doing: dict[str, Callable[[Item, Request], Awaitable[None]]] = {
             "object": self._object,
             "choices": self._choices,
@@ -212,21 +213,28 @@ class _Pages:
 
     async def _edit(self, item: Item, request: Request) -> None:
         asked = await _json(request)
-        match asked:
-            case {"do": "undo"}:
-                self._studio.look_at(item, -1)
-            case {"do": "redo"}:
-                self._studio.look_at(item, 1)
-            case {"do": "pull", "vertex": int(vertex), "to": [int() | float() as x, int() | float() as y]}:
-                places = {vertex: (float(x), float(y))}
-                sequence, moved = await asyncio.to_thread(by_hand.pull, item, places)
-                self._studio.edited(item, sequence, f"vertex {vertex} pulled by hand", moved)
-            case {"do": operator, **rest} if operator != "pull":
-                step = options_of(edits.Asked, {"operator": operator, **rest}, "edit: ")
-                sequence = await asyncio.to_thread(by_hand.change, item, step)
-                self._studio.edited(item, sequence, f"{step.operator.replace('_', ' ')} by hand")
-            case _:
-                raise ConfigError("edit: expected undo, redo, a vertex to pull, or an operator with its element")
+        async with self._editing:  # so that the next one changes what comes of this one
+            match asked:
+                case {"do": "undo"}:
+                    self._studio.look_at(item, -1)
+                case {"do": "redo"}:
+                    self._studio.look_at(item, 1)
+                case {"do": "pull", **rest}:
+                    await self._pull(item, options_of(edits.Pull, rest, "edit: "))
+                case {"do": operator, **rest}:
+                    await self._change(item, options_of(edits.Asked, {"operator": operator, **rest}, "edit: "))
+                case _:
+                    raise ConfigError("edit: expected undo, redo, a vertex to pull, or an operator with its element")
+
+    async def _pull(self, item: Item, asked: edits.Pull) -> None:
+        before = item.version
+        sequence, moved = await asyncio.to_thread(by_hand.pull, item, {asked.vertex: asked.to})
+        self._studio.edited(item, before, sequence, f"vertex {asked.vertex} pulled by hand", moved)
+
+    async def _change(self, item: Item, asked: edits.Asked) -> None:
+        before = item.version
+        sequence = await asyncio.to_thread(by_hand.change, item, asked)
+        self._studio.edited(item, before, sequence, f"{asked.operator.replace('_', ' ')} by hand")
 
     async def _retell(self, item: Item, request: Request) -> None:
         given = (await _json(request)).get("from")
@@ -262,7 +270,7 @@ def stem_of(name: str) -> str:
     stem = last.rpartition(".")[0] if _has_known_ending(last) else last
     for ending in (".studio", ".sequence", ".lesson"):
         stem = stem.removesuffix(ending)
-    return "".join(letter for letter in stem if letter.isprintable()).strip(" .")[:80] or "picture"
+    return uploads.plain_name(stem)
 
 
 def _has_known_ending(name: str) -> bool:

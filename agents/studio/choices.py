@@ -14,6 +14,7 @@ from autopoly_env.errors import ConfigError
 from autopoly_env.guidance import read_importance
 from autopoly_env.score import ScoreWeights
 from autopoly_env.sequence import ConstructionSequence
+from autopoly_env.shown import short
 from autopoly_env.silhouette import DEFAULT_OPTIONS, ObjectOptions, Silhouette
 
 RESOLUTION, MAX_STEPS = 128, 100  # the defaults of agents.solve
@@ -45,7 +46,7 @@ class Choices:
         ):
             value = getattr(self, name)
             if value is not None and not least <= value <= most:
-                raise ConfigError(f"{name} {value:g}: expected {least:g} to {most:g}")
+                raise ConfigError(f"{name} {short(value)}: expected {least:g} to {most:g}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -40,6 +40,14 @@ def pulled(sequence: ConstructionSequence, places: Places, scored: Scored) -> Co
 
 
 @dataclass(frozen=True)
+class Pull:
+    """A vertex, by its id, that is to lie elsewhere."""
+
+    vertex: int
+    to: tuple[float, float]  # in the unit square
+
+
+@dataclass(frozen=True)
 class Asked:
     """A step that is asked for: elements and what is left to choose by ids, as a sequence names them."""
 

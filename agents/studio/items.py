@@ -111,7 +111,7 @@ class Item:
     def axis(self) -> float | None:
         """The axis about which left and right were asked to be alike in the version that is looked at."""
         found = None if self.version is None else self.version.sequence.settings.get("symmetry")
-        return float(found) if isinstance(found, int | float) and not isinstance(found, bool) else None
+        return float(found) if isinstance(found, int | float) and 0.0 < found < 1.0 else None
 
     def summary(self) -> dict[str, Any]:
         """A line in the list of all pictures."""

@@ -22,6 +22,7 @@ from autopoly_env.silhouette import ObjectOptions
 FORMAT, VERSION = "autopoly-studio", 1
 SUFFIX = ".studio.json"
 MOST_NAME = 120  # letters
+MOST_COMMAS = 1_000_000  # of a text: while Python reads JSON, it does nothing else
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +60,8 @@ def read_shared(text: str) -> Shared | None:
 
     Raises SequenceError, ConfigError, for what is none, or not sound.
     """
+    if text.count(",") > MOST_COMMAS:
+        raise SequenceError(f"more than {MOST_COMMAS:,} values; give a picture, a sequence or a shared file")
     try:
         values = json.loads(text)
     except (ValueError, RecursionError) as error:

@@ -227,12 +227,24 @@ class Studio:
 
     # --- edits ---
 
-    def edited(self, item: Item, sequence: ConstructionSequence, told: str, locked: tuple[int, ...] = ()) -> None:
-        """What a hand has made of the version that was looked at; `locked`: vertices that are to stay there."""
+    def edited(
+        self,
+        item: Item,
+        before: Version | None,
+        sequence: ConstructionSequence,
+        told: str,
+        locked: tuple[int, ...] = (),
+    ) -> None:
+        """What a hand has made of the version `before`; `locked`: vertices that are to stay where they are.
+
+        Raises ConfigError where something else is looked at by now, which would be lost.
+        """
+        if self.items.get(item.id) is not item or item.version is not before:
+            raise ConfigError("the mesh has changed meanwhile: look at it, and try again")
         if self._worker_of(item) is not None or item in self._waiting:
             self._withdraw(item)
-        before = () if item.version is None else item.version.locked
-        item.push(Version(sequence, told, locked=tuple(sorted({*before, *locked})), is_by_hand=True))
+        kept = () if before is None else before.locked
+        item.push(Version(sequence, told, locked=tuple(sorted({*kept, *locked})), is_by_hand=True))
         item.status, item.problem = DONE, ""
         self.tell(item)
         self._assign()

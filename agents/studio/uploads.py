@@ -48,9 +48,19 @@ async def body_of(request: Request, most_bytes: int) -> bytes:
     async for part in request.stream():
         size += len(part)
         if size > most_bytes:
-            raise TooLargeError
+            raise TooLargeError(f"That is too large: at most {_in_words(most_bytes)}.")
         parts.append(part)
     return b"".join(parts)
+
+
+def _in_words(n_bytes: int) -> str:
+    return f"{n_bytes // 10**6} MB a file" if n_bytes >= 10**6 else f"{n_bytes:,} bytes of this"
+
+
+def plain_name(text: str) -> str:
+    """A name of at most 80 letters that can be shown, typed and sent, and of which no part is a folder."""
+    kept = "".join(letter for letter in text if letter.isprintable() and letter not in "/\\")
+    return kept.strip(" .")[:80] or "picture"
 
 
 def opened(name: str, data: bytes) -> Opened:
@@ -75,6 +85,7 @@ def _opened_text(name: str, data: bytes) -> Opened:
     if shared is None:
         sequence = ConstructionSequence.from_json(text)
         return _without_picture(name, sequence)
+    shared = replace(shared, name=plain_name(shared.name))
     if shared.picture is None:
         if shared.sequence is None:
             raise SequenceError(f"{name!r} holds neither a picture nor a construction")

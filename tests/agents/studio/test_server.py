@@ -9,6 +9,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -178,6 +179,11 @@ def test_files_that_are_no_pictures__are_refused_in_one_line(
     assert answer.status_code == 422 and answer.text.count("\n") == 1 and re.search(said, answer.text), answer.text
 
 
+def test_text_with_a_million_values__is_refused_before_it_is_read(web: httpx.Client) -> None:
+    answer = web.post("pictures", params={"name": "a.json"}, content=b'{"a":[' + b"[]," * 1_000_001 + b"[]]}")
+    assert answer.status_code == 422 and "more than 1,000,000 values" in answer.text
+
+
 def test_500_megabytes__are_refused_before_they_are_sent(studio: Running) -> None:
     host, port = studio.root.removeprefix("http://").rstrip("/").split(":")
     with socket.create_connection((host, int(port)), timeout=10.0) as line:
@@ -246,6 +252,8 @@ def test_odd_names__become_plain_ones(web: httpx.Client, name: str) -> None:
         ("locks", {"ids": ["0"]}),
         ("edit", {"do": "pull", "vertex": 0, "to": [5, 5]}),
         ("edit", {"do": "pull", "vertex": "0", "to": [0.5, 0.5]}),
+        ("edit", {"do": "pull", "vertex": 0, "to": [10**400, 0.5]}),
+        ("edit", {"do": "pull", "vertex": 10**4000, "to": [0.5, 0.5]}),
         ("edit", {"do": "face_delete", "element": {"face": 12345}}),
         ("edit", {"do": "__import__"}),
         ("edit", {"do": "face_delete", "element": [1], "more": 1}),
@@ -263,6 +271,26 @@ def test_odd_requests__are_refused_in_one_line(web: httpx.Client, what: str, bod
 def test_bodies_that_are_no_objects__are_refused(web: httpx.Client, body: bytes) -> None:
     number = add(web, house().to_json().encode(), "odd.json")
     assert web.post(f"pictures/{number}/choices", content=body).status_code in (413, 422)
+
+
+def test_list_that_is_too_long__is_told_what_it_may_have(web: httpx.Client) -> None:
+    number = add(web, house().to_json().encode(), "odd.json")
+    answer = web.post(f"pictures/{number}/locks", json={"ids": [0] * 50_000})
+    assert answer.status_code == 413 and "100,000 bytes" in answer.text
+
+
+def test_edits_sent_at_once__are_all_kept(web: httpx.Client) -> None:
+    number = add(web, house(2).to_json().encode(), "odd.json")
+    mesh = ConstructionSequence.from_json(web.get(f"pictures/{number}/take/sequence").text).final()
+    u, v = mesh.vertex_ids[:2]
+    places = {name: mesh.vertices[mesh.vertex_index(name)] + 0.01 for name in (u, v)}
+    with ThreadPoolExecutor(2) as both:
+        bodies = [{"do": "pull", "vertex": name, "to": place.tolist()} for name, place in places.items()]
+        answers = list(both.map(lambda body: web.post(f"pictures/{number}/edit", json=body), bodies))
+    assert [answer.status_code for answer in answers] == [204, 204], [answer.text for answer in answers]
+    after = ConstructionSequence.from_json(web.get(f"pictures/{number}/take/sequence").text).final()
+    for name, place in places.items():
+        assert np.allclose(after.vertices[after.vertex_index(name)], place)
 
 
 def test_paint_of_another_size__is_refused(web: httpx.Client) -> None:
@@ -311,6 +339,16 @@ def test_shared_file__brings_everything_back(web: httpx.Client) -> None:
     assert item["locked"] == [1] and item["is_painted"] and item["name"].startswith("mine")
     assert web.get(f"pictures/{other}/importance").content == levels
     assert web.get(f"pictures/{other}/picture.png").content == web.get(f"pictures/{number}/picture.png").content
+
+
+@pytest.mark.parametrize("name", ["../../etc/passwd", "a\r\nb", "\ud800", "a\u202eb\0", "..."])
+def test_shared_file_with_an_odd_name__gets_a_plain_one(web: httpx.Client, name: str) -> None:
+    shared = {"format": "autopoly-studio", "version": 1, "name": name, "sequence": json.loads(house().to_json())}
+    number = add(web, json.dumps(shared).encode(), "odd.studio.json")
+    kept = done(web, number)["name"]
+    assert kept.isprintable() and not set(kept) & set("/\\") and kept.strip(" .")
+    for kind in ("share", "svg"):
+        assert web.get(f"pictures/{number}/take/{kind}").status_code == 200
 
 
 def test_sequence_alone__is_opened_over_its_own_mesh(web: httpx.Client) -> None:

@@ -3,6 +3,7 @@
 import asyncio
 import json
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -172,7 +173,7 @@ def test_undo__goes_back_to_every_version_with_its_locks_and_an_edit_forgets_wha
         item = dropped(studio)
         front.finds(1)
         item.lock((0,))
-        studio.edited(item, house(2), "split", (2,))
+        studio.edited(item, item.version, house(2), "split", (2,))
         assert item.version is not None and item.version.locked == (0, 2)
         studio.look_at(item, -1)
         assert len(item.version.sequence.steps) == 1 and item.version.locked == (0,)
@@ -181,7 +182,7 @@ def test_undo__goes_back_to_every_version_with_its_locks_and_an_edit_forgets_wha
         studio.look_at(item, 1)
         assert len(item.version.sequence.steps) == 2
         studio.look_at(item, -1)
-        studio.edited(item, house(3), "extrude")
+        studio.edited(item, item.version, house(3), "extrude")
         studio.look_at(item, 1)
         assert len(item.versions) == 2 and len(item.version.sequence.steps) == 3
 
@@ -193,10 +194,24 @@ def test_edit__ends_a_search_that_would_not_know_of_it() -> None:
         item = dropped(studio)
         front.finds()
         studio.search(item)
-        studio.edited(item, house(3), "extrude")
+        studio.edited(item, item.version, house(3), "extrude")
         assert front.orders == ["drop"] and item.status == "done"
         front.finds(1)  # too late
         assert item.version is not None and len(item.version.sequence.steps) == 3
+
+    play(of)
+
+
+def test_edit_of_what_is_not_looked_at_any_more__is_refused() -> None:
+    def of(studio: Studio, front: Idler, _: Idler) -> None:
+        item = dropped(studio)
+        front.finds(1)
+        before = item.version
+        studio.search(item)
+        front.finds(2)
+        with pytest.raises(ConfigError, match="has changed meanwhile"):
+            studio.edited(item, before, house(3), "extrude")
+        assert item.version is not None and len(item.version.sequence.steps) == 2
 
     play(of)
 
@@ -234,6 +249,12 @@ def test_names__are_given_once() -> None:
     play(of)
 
 
+@pytest.mark.parametrize(("axis", "found"), [(0.5, 0.5), (10**400, None), (1e308, None), (-3, None), (True, None)])
+def test_axis_of_a_construction__lies_within_the_picture(axis: float, found: float | None) -> None:
+    sequence = replace(house(), settings={"symmetry": axis})
+    assert Item.of(1, Opened("house", painted(HOUSE), sequence=sequence)).axis() == found
+
+
 def test_end__stops_what_is_searched_and_tells_what_there_is() -> None:
     async def of(studio: Studio, front: Idler, back: Idler) -> None:
         mine, other = dropped(studio, "mine"), dropped(studio, "other", waits=True)
@@ -252,9 +273,11 @@ def test_end__stops_what_is_searched_and_tells_what_there_is() -> None:
 @pytest.mark.parametrize(
     ("choices", "said"),
     [
-        ({"w_sc": 0.0}, "w_sc 0: expected 0.001 to 20"),
+        ({"w_sc": 0.0}, "w_sc 0.0: expected 0.001 to 20"),
         ({"seconds": 1e9}, "seconds"),
         ({"refits": 0}, "refits"),
+        ({"refits": 10**400}, "refits"),
+        ({"seed": 10**5000}, "seed"),
         ({"seed": -1}, "seed"),
         ({"style": "baroque"}, "baroque"),
         ({"symmetry": "left"}, "symmetry"),
