@@ -13,7 +13,7 @@ from agents.studio.choices import Choices, Task
 from agents.studio.crew import Deliver, Worker
 from agents.studio.items import DONE, FAILED, IDLE, PAUSED, SEARCHING, WAITING, Item, Version
 from agents.studio.masks import painted_target
-from agents.studio.uploads import Opened
+from agents.studio.uploads import MOST_OF_FOLDER, Opened, begun, folder_name
 from autopoly_env.errors import AutoPolyError, ConfigError
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import ObjectOptions
@@ -74,19 +74,19 @@ class Studio:
         """Close a picture."""
         self._withdraw(item)
         del self.items[item.id]
-        self._names.discard(item.name.casefold())
+        self._names.discard(_key(item.name))
         for key in (f"item-{item.id}", f"live-{item.id}"):
             self.channel.forget(key)
         self._tell_list()
         self._assign()
 
     def named(self, found: Opened) -> Opened:
-        """The file under a name that no other one has, as results are named after it."""
+        """The file under a name that no other one has, nor its folder, as results are named after it."""
         name, count = found.name, 1
-        while name.casefold() in self._names:
+        while _key(name) in self._names:
             count += 1
-            name = f"{found.name}-{count}"
-        self._names.add(name.casefold())
+            name = f"{begun(found.name, MOST_OF_FOLDER - 8)}-{count}"
+        self._names.add(_key(name))
         return found.under(name)
 
     def with_object(self, item: Item, options: ObjectOptions, found: Opened) -> None:
@@ -281,6 +281,11 @@ class Studio:
             worker.end()
         self.channel.close()
         return iter([item for item in self.items.values() if item.version is not None])
+
+
+def _key(name: str) -> str:
+    """What two names share that would be one folder, on a system that tells no capitals from others."""
+    return folder_name(name).casefold()
 
 
 def _version_of(task: Task, item: Item, news: dict[str, Any]) -> Version:

@@ -13,6 +13,7 @@ from agents.commands.results import write_results
 from agents.studio.items import Item, Version
 from agents.studio.painting import as_png
 from agents.studio.sharing import SUFFIX, Shared, write_shared
+from agents.studio.uploads import folder_name
 from autopoly_env.errors import ConfigError
 from autopoly_env.export.formats import Export, check_size, find_format, formats
 from autopoly_env.sequence import ConstructionSequence
@@ -99,7 +100,7 @@ def taken(taking: Taking, kind: str, depth: float = 0.0, size: float | None = No
         check_size(size) if size is not None and "size" in made.heeded else None,
     )
     with tempfile.TemporaryDirectory(prefix="autopoly-studio-") as folder:
-        path = Path(folder) / f"{_plain(taking.name)}{made.suffix}"
+        path = Path(folder) / f"{folder_name(taking.name)}{made.suffix}"
         made.write(given, path)
         return Taken(f"{taking.name}{made.suffix}", path.read_bytes())
 
@@ -131,7 +132,7 @@ def all_results(takings: Iterable[Taking]) -> Taken:
                 continue
             files = write_results(Path(folder) / str(k), taking.version.sequence, silhouette, nullcontext)
             for name, path in files.items():
-                archive.write(path, f"{_plain(taking.name)}/{name}")
+                archive.write(path, f"{folder_name(taking.name)}/{name}")
     return Taken("autopoly.zip", stream.getvalue())
 
 
@@ -139,13 +140,7 @@ def keep(taking: Taking, out: Path) -> Path:
     """Write the results into the folder `out`, and return where they are. Raises OutputError."""
     if taking.silhouette is None:
         raise ConfigError(f"{taking.name}: there is no picture to write beside the mesh")
-    folder = out / _plain(taking.name)
+    folder = out / folder_name(taking.name)
     out.mkdir(parents=True, exist_ok=True)
     write_results(folder, taking.version.sequence, taking.silhouette, nullcontext)
     return folder
-
-
-def _plain(name: str) -> str:
-    """A name that is a file's on every system, and of no other folder."""
-    kept = "".join(letter if letter.isalnum() or letter in " -_.()" else "_" for letter in name).strip(" .")
-    return kept.encode()[:100].decode("utf-8", "ignore") or "picture"

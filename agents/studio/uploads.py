@@ -15,6 +15,7 @@ from autopoly_env.silhouette import DEFAULT_OPTIONS, ObjectOptions, Silhouette, 
 
 MOST_BYTES = 64_000_000  # of a file
 MOST_PIXELS = 64_000_000  # of a picture
+MOST_OF_FOLDER = 100  # bytes of a folder's name
 SHOWN, SMALL = 1024, 96  # pixels a side at most: of the picture on the page, and in the list
 
 
@@ -61,6 +62,17 @@ def plain_name(text: str) -> str:
     """A name of at most 80 letters that can be shown, typed and sent, and of which no part is a folder."""
     kept = "".join(letter for letter in text if letter.isprintable() and letter not in "/\\")
     return kept.strip(" .")[:80] or "picture"
+
+
+def folder_name(name: str) -> str:
+    """A name that is a file's on every system, and of no other folder."""
+    kept = "".join(letter if letter.isalnum() or letter in " -_.()" else "_" for letter in name).strip(" .")
+    return begun(kept, MOST_OF_FOLDER) or "picture"
+
+
+def begun(text: str, most_bytes: int) -> str:
+    """As much of the text as has so many bytes."""
+    return text.encode()[:most_bytes].decode("utf-8", "ignore")
 
 
 def opened(name: str, data: bytes) -> Opened:

@@ -13,7 +13,7 @@ from agents.studio.crew import Deliver
 from agents.studio.items import Item
 from agents.studio.painting import PLAIN, SIDE
 from agents.studio.studio import NoItemError, Studio
-from agents.studio.uploads import Opened
+from agents.studio.uploads import Opened, folder_name
 from autopoly_env.errors import ConfigError
 from tests.helpers.constructions import house
 from tests.helpers.drawings import HOUSE, painted
@@ -253,6 +253,15 @@ def test_names__are_given_once() -> None:
 def test_axis_of_a_construction__lies_within_the_picture(axis: float, found: float | None) -> None:
     sequence = replace(house(), settings={"symmetry": axis})
     assert Item.of(1, Opened("house", painted(HOUSE), sequence=sequence)).axis() == found
+
+
+def test_names_that_would_be_one_folder__are_told_apart() -> None:
+    def of(studio: Studio, _: Idler, __: Idler) -> None:
+        given = ("a:b", "a?b", "x_", "x*", "椅" * 80, "椅" * 79)
+        names = [dropped(studio, name).name for name in given]
+        assert len({folder_name(name) for name in names}) == len(given)
+
+    play(of)
 
 
 def test_end__stops_what_is_searched_and_tells_what_there_is() -> None:
