@@ -10,6 +10,7 @@ from agents.studio.choices import Choices, Task, as_plain
 from agents.studio.masks import painted_target, plain_mask
 from agents.studio.shapes import plain_mesh
 from agents.studio.uploads import Opened
+from agents.studio.wording import in_words
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.score import Score, ScoreWeights, score
@@ -133,7 +134,7 @@ class Item:
             "has_picture": bool(self.picture),
             "object": self.options.__dict__ | {},
             "given_object": pictures.as_dict(self.options),
-            "notes": [] if self.silhouette is None else list(self.silhouette.notes),
+            "notes": [] if self.silhouette is None else [in_words(note) for note in self.silhouette.notes],
             **plain_mask(self.silhouette),
             "choices": as_plain(self.choices),
             "is_painted": self.painted is not None,
@@ -156,7 +157,7 @@ class Item:
             "told": version.told,
             "command": version.command,
             "files": [] if version.task is None else list(version.task.files().values()),
-            "notes": list(version.notes),
+            "notes": [in_words(note) for note in version.notes],
             "n_steps": len(sequence.steps),
             "totals": [round(one["total"], 3) for one in _scores(sequence)],
             "faces": sequence.faces,

@@ -14,6 +14,7 @@ from agents.studio.items import Item, Version
 from agents.studio.painting import as_png
 from agents.studio.sharing import SUFFIX, Shared, write_shared
 from agents.studio.uploads import folder_name
+from agents.studio.wording import in_words
 from autopoly_env.errors import ConfigError
 from autopoly_env.export.formats import Export, check_size, find_format, formats
 from autopoly_env.sequence import ConstructionSequence
@@ -58,7 +59,7 @@ def kinds() -> list[dict[str, Any]]:
         {
             "name": made.name,
             "suffix": made.suffix,
-            "help": _in_words(made.help),
+            "help": in_words(made.help),
             "heeds": sorted(made.heeded & {"depth", "size"}),
         }
         for made in formats().values()
@@ -68,17 +69,6 @@ def kinds() -> list[dict[str, Any]]:
         {"name": SEQUENCE, "suffix": ".sequence.json", "help": "the construction, to be replayed", "heeds": []},
         *found,
     ]
-
-
-def _in_words(help_of_option: str) -> str:
-    """A line of help for those who type no options."""
-    for option, words in (
-        ("; all steps with --layers", ""),
-        ("with --depth", "with a thickness"),
-        ("--depth", "a thickness"),
-    ):
-        help_of_option = help_of_option.replace(option, words)
-    return help_of_option
 
 
 def taken(taking: Taking, kind: str, depth: float = 0.0, size: float | None = None) -> Taken:

@@ -248,11 +248,14 @@ const selectTab = makeTabs(name => {
 makeObjectPanel(options => sendObject(options));
 makeSearchPanel(() => { if (state.item) sendChoices(); });
 trying(ask("kinds").then(answer => answer.json()).then(kinds => makeTakePanel(kinds, state, say)));
-trying(ask("examples").then(answer => answer.json()).then(names => byId("examples").replaceChildren(...names.map(name => {
+function exampleLine(name) {
   const button = make("button", { type: "button" }, make("img", { src: `examples/${name}.png`, alt: "", loading: "lazy" }), name.replace(/_/g, " "));
   button.addEventListener("click", () => trying(ask(`examples/${name}`, { method: "POST" }).then(answer => answer.json()).then(({ id }) => open(id))));
   return make("li", {}, button);
-}))));
+}
+trying(ask("examples").then(answer => answer.json()).then(names => {
+  for (const list of document.querySelectorAll(".examples")) list.replaceChildren(...names.map(exampleLine));
+}));
 addEventListener("hashchange", () => {
   const id = Number(location.hash.slice(1));
   if (state.items.some(item => item.id === id)) open(id);

@@ -129,6 +129,16 @@ def test_name_with_markup__is_text(open_studio: Open, tmp_path: Path) -> None:
 
 
 @needs_browser
+def test_examples__are_there_beside_open_pictures(open_studio: Open) -> None:
+    page = open_studio()
+    example(page, "mug")
+    page.click("#more-examples summary")
+    page.evaluate("document.querySelector('#more-examples li:nth-child(6) button').id = 'second'")
+    page.click("#second")
+    page.wait_for("document.getElementById('name').textContent === 'chair'")
+
+
+@needs_browser
 def test_file_that_is_no_picture__is_told_and_the_page_goes_on(open_studio: Open, tmp_path: Path) -> None:
     (tmp_path / "notes.png").write_text("hello")
     with (tmp_path / "huge.png").open("wb") as stream:
@@ -370,7 +380,7 @@ def test_task__a_mug_with_its_handle_kept(open_studio: Open) -> None:
     choose(page, "#price", "0", "input")  # so simple that the handle is lost
     page.wait_for("document.getElementById('command').textContent.includes('--w-sc 3')")
     solved(page)
-    assert not n_holes(held(page)) and "the picture has 1 hole, the mesh none" in page.text("#said")
+    assert not n_holes(held(page)) and "the mesh none: “Keep: all holes” keeps them" in page.text("#said")
     choose(page, "#keep", "holes")
     page.wait_for("document.getElementById('command').textContent.includes('--keep holes')")
     assert n_holes(held(page)) == 1
