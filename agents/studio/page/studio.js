@@ -33,6 +33,7 @@ const stage = new Stage((name, value) => {
   if (name === "lock") {
     const ids = new Set(stage.locked);
     if (!ids.delete(value)) ids.add(value);
+    stage.showLocked(ids); // at once, so that the next click adds to them
     return trying(post(path("locks"), { ids: [...ids] }));
   }
 });
@@ -46,7 +47,7 @@ const sendObject = newestOnly(async value => {
 // --- news ---
 
 const news = new News((kind, value, id) => {
-  if (kind === "silence") return announce("The server does not answer.");
+  if (kind === "silence") return say("The server does not answer: has it been ended?");
   if (kind === "list") return hearList(value);
   if (kind === "crew") { state.crew = value; return showState(); }
   if (id !== state.id) return;

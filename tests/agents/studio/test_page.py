@@ -238,6 +238,30 @@ def test_vertex__is_pulled_with_the_mouse_locked_and_kept_when_the_search_goes_o
 
 
 @needs_browser
+def test_vertices_that_are_clicked_quickly__are_all_locked(open_studio: Open) -> None:
+    page = open_studio()
+    example(page, "mug")
+    solved(page)
+    tool(page, "lock")
+    page.evaluate(
+        """[...document.querySelectorAll("#vertices g")].slice(0, 3)
+        .forEach(one => one.dispatchEvent(new MouseEvent("click", { bubbles: true })))"""
+    )
+    page.wait_for("(document.getElementById('locks').textContent.match(/\\d+/g) || []).length === 3")
+
+
+@needs_browser
+def test_server_that_was_ended__is_told_to_those_who_see_the_page(browser: Browser, tmp_path: Path) -> None:
+    with serving(out=tmp_path / "out") as running:
+        page = browser.open(running.address)
+        page.wait_for("document.querySelectorAll('#examples button').length > 0")
+        running.stop()
+    page.wait_for("document.getElementById('message').checkVisibility()")
+    assert "has it been ended?" in page.text("#message")
+    page.close()
+
+
+@needs_browser
 def test_faces_and_edges__are_deleted_split_and_cut_and_everything_is_undone(open_studio: Open) -> None:
     page = open_studio()
     example(page, "mug")
