@@ -90,7 +90,8 @@ class Studio:
         return found.under(name)
 
     def with_object(self, item: Item, options: ObjectOptions, found: Opened) -> None:
-        """Other options for what the object is, and the mask that they found."""
+        """Other options for what the object is, and the mask that they found. Raises NoItemError."""
+        self.item(item.id)  # it may have been closed since it was asked for
         item.options, item.problem = options, found.problem
         item.silhouette = found.silhouette
         item.wish_number += 1
@@ -128,7 +129,11 @@ class Studio:
         self.search(item, goes_on=keeps_hand and version is not None and (version.is_by_hand or bool(version.locked)))
 
     def search(self, item: Item, *, goes_on: bool = False, steps: ConstructionSequence | None = None) -> None:
-        """Search anew, from the picture or on from the version that is looked at; or tell `steps` again for it."""
+        """Search anew, from the picture or on from the version that is looked at; or tell `steps` again for it.
+
+        Raises ConfigError where there is no object; NoItemError.
+        """
+        self.item(item.id)
         if item.silhouette is None:
             raise ConfigError(f"there is no object in the picture yet: {item.problem or 'choose another option'}")
         self._withdraw(item)
@@ -237,9 +242,10 @@ class Studio:
     ) -> None:
         """What a hand has made of the version `before`; `locked`: vertices that are to stay where they are.
 
-        Raises ConfigError where something else is looked at by now, which would be lost.
+        Raises ConfigError where something else is looked at by now, which would be lost; NoItemError.
         """
-        if self.items.get(item.id) is not item or item.version is not before:
+        self.item(item.id)
+        if item.version is not before:
             raise ConfigError("the mesh has changed meanwhile: look at it, and try again")
         if self._worker_of(item) is not None or item in self._waiting:
             self._withdraw(item)

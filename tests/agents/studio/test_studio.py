@@ -240,6 +240,24 @@ def test_closing_a_picture__in_mid_search_frees_the_worker() -> None:
     play(of)
 
 
+def test_picture_that_was_closed_meanwhile__is_not_searched() -> None:
+    def of(studio: Studio, front: Idler, _: Idler) -> None:
+        item = dropped(studio)
+        front.finds()
+        studio.remove(item)
+        found = Opened(item.name, painted(HOUSE))
+        for late in (
+            lambda: studio.search(item),
+            lambda: studio.with_object(item, item.options, found),
+            lambda: studio.edited(item, item.version, house(3), "extrude"),
+        ):
+            with pytest.raises(NoItemError):
+                late()
+        assert len(front.tasks) == 1 and not studio.items
+
+    play(of)
+
+
 def test_names__are_given_once() -> None:
     def of(studio: Studio, _: Idler, __: Idler) -> None:
         items = [dropped(studio, name) for name in ("mug", "Mug", "mug")]
