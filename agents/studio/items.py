@@ -100,8 +100,9 @@ class Item:
         return Task(self.silhouette, self.options, self.choices, self.painted, start, locked, steps)
 
     def target(self) -> Silhouette:
-        """The silhouette with what matters in it."""
-        assert self.silhouette is not None
+        """The silhouette with what matters in it. Raises ConfigError where no object was found."""
+        if self.silhouette is None:
+            raise ConfigError(f"there is no object in the picture: {self.problem or 'choose another option'}")
         return painted_target(self.silhouette, self.painted)
 
     def scored(self, mesh: PolyMesh) -> Score:

@@ -8,8 +8,10 @@ from typing import Any
 
 import pytest
 
+from agents.studio import by_hand
 from agents.studio.choices import Choices, Task
 from agents.studio.crew import Deliver
+from agents.studio.edits import Asked
 from agents.studio.items import Item
 from agents.studio.painting import PLAIN, SIDE
 from agents.studio.studio import NoItemError, Studio
@@ -254,6 +256,17 @@ def test_picture_that_was_closed_meanwhile__is_not_searched() -> None:
             with pytest.raises(NoItemError):
                 late()
         assert len(front.tasks) == 1 and not studio.items
+
+    play(of)
+
+
+def test_edit_where_the_object_is_not_found_any_more__is_refused() -> None:
+    def of(studio: Studio, front: Idler, _: Idler) -> None:
+        item = dropped(studio)
+        front.finds()
+        studio.with_object(item, item.options, Opened(item.name, None, "nothing is dark"))
+        with pytest.raises(ConfigError, match="no object in the picture: nothing is dark"):
+            by_hand.change(item, Asked("face_delete", {"face": 0}))
 
     play(of)
 
