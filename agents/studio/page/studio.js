@@ -6,7 +6,7 @@ import {
 } from "./panels.js";
 
 const { byId, curve, make } = Drawing;
-const AT_ONCE = 2, SETTLED_MS = 30; // uploads; milliseconds
+const AT_ONCE = 2, MOST_TOLD = 3, SETTLED_MS = 30; // uploads; of them that are refused; milliseconds
 const state = { id: 0, item: null, items: [], live: null, target: "", paint: null, crew: { is_ready: true } };
 let messageTimer = 0;
 
@@ -169,7 +169,7 @@ function showState() {
 // --- what is dropped, pasted and chosen ---
 
 async function add(files) {
-  const list = [...files], waits = list.length > 1;
+  const list = [...files], waits = list.length > 1, refused = [];
   let next = 0, first = 0;
   const one = async () => {
     while (next < list.length) {
@@ -177,7 +177,10 @@ async function add(files) {
       try {
         const { id } = await upload(file, waits);
         if (!first) { first = id; if (!waits) open(id); }
-      } catch (error) { say(error.message); }
+      } catch (error) {
+        refused.push(error.message);
+        say(refused.length > MOST_TOLD ? `${refused.slice(0, MOST_TOLD).join(" – ")} – and ${refused.length - MOST_TOLD} more` : refused.join(" – "));
+      }
     }
   };
   await Promise.all(Array.from({ length: AT_ONCE }, one));

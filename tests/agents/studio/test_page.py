@@ -154,6 +154,18 @@ def test_file_that_is_no_picture__is_told_and_the_page_goes_on(open_studio: Open
 
 
 @needs_browser
+def test_files_that_are_no_pictures__are_all_told(open_studio: Open, tmp_path: Path) -> None:
+    paths = [tmp_path / f"note {k}.png" for k in range(5)]
+    for path in paths:
+        path.write_text("hello")
+    page = open_studio()
+    page.drop(*paths)
+    page.wait_for("document.getElementById('message').textContent.includes('and 2 more')")
+    assert page.text("#message").count("is not an image") == 3
+    page.console.clear()  # as above
+
+
+@needs_browser
 def test_pause__stands_still_and_going_on_goes_on(open_studio: Open) -> None:
     page = open_studio()
     example(page, "bicycle")
