@@ -44,3 +44,9 @@ def test_every_verb__is_listed_by_help() -> None:
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     (phony,) = re.findall(r"^\.PHONY: (.*)$", makefile, re.MULTILINE)
     assert phony.split() == re.findall(r"^([a-z]+):.*## ", makefile, re.MULTILINE)
+
+
+def test_studio__comes_with_what_its_page_offers() -> None:
+    """SVG in, DXF out; whoever opens it with `make studio` types no `pip install`."""
+    extras = PROJECT["project"]["optional-dependencies"]
+    assert "autopoly-env[dxf,svg]" in extras["studio"] and {"dxf", "svg"} <= set(extras)
