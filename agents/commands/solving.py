@@ -55,10 +55,7 @@ class Settings:
     def check(self) -> None:
         """Raise ConfigError for whatever is wrong, before any image is read."""
         agent = self.new_agent()
-        wishes = self.wishes
-        if wishes.symmetry is True and wishes.start is not None:  # whether they agree is seen with the image
-            wishes = replace(wishes, symmetry=None)
-        wishes = replace(wishes, importance=None)  # so is whether it has the image's proportions
+        wishes = replace(self.wishes, importance=None)  # whether it has the image's proportions is seen with that
         dummy = replace(self, wishes=wishes).simulator(Silhouette(np.ones((1, 1), np.bool_)))
         agent.check(dummy)
         if self.budget.simulations is not None and not agent.runs_simulations:

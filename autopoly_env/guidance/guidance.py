@@ -14,6 +14,7 @@ from autopoly_env.arguments import number
 from autopoly_env.errors import ConfigError, IllegalActionError, MeshError
 from autopoly_env.guidance.symmetry import asymmetry, best_axis
 from autopoly_env.mesh import PolyMesh, canonical_hash, defects_of, images_of, validate
+from autopoly_env.mesh.symmetry import axis_of
 from autopoly_env.operators import OPERATORS, Action, describe
 from autopoly_env.refit import Bonds
 from autopoly_env.sequence import ConstructionSequence
@@ -94,7 +95,7 @@ class Guidance:
             return Bonds(locked, np.full(len(locked), -1, np.int64))
         images = images_of(mesh, self.axis)
         if images is None:
-            raise self._unsymmetric("the mesh")
+            raise self._unsymmetric("the mesh", mesh)
         return Bonds(locked, images, self.axis)
 
     def is_symmetric(self, mesh: PolyMesh) -> bool:
@@ -104,12 +105,12 @@ class Guidance:
     def check_symmetric(self, mesh: PolyMesh) -> None:
         """Raise ConfigError if symmetry is wished for and the outline has none."""
         if not self.is_symmetric(mesh):
-            raise self._unsymmetric("the start mesh")
+            raise self._unsymmetric("the start mesh", mesh)
 
-    def _unsymmetric(self, what: str) -> ConfigError:
-        return ConfigError(
-            f"the outline of {what} is not symmetric about x = {self.axis:g}: mirror it, or give another axis or none"
-        )
+    def _unsymmetric(self, what: str, mesh: PolyMesh) -> ConfigError:
+        own = axis_of(mesh)
+        hint = "mirror it, or give another axis or none" if own is None else f"it is about x = {own:g}; give that axis"
+        return ConfigError(f"the outline of {what} is not symmetric about x = {self.axis:g}: {hint}")
 
     def check_locks(self, before: PolyMesh, action: Action, after: PolyMesh) -> None:
         """Raise IllegalActionError if a locked vertex is gone after the action."""
@@ -184,16 +185,35 @@ def _axis(silhouette: Silhouette, start: PolyMesh | None, symmetry: bool | float
     if symmetry is None or symmetry is False:
         return None
     if symmetry == AUTO:
-        axis = best_axis(silhouette)
-        if asymmetry(silhouette, axis) > MOST_ASYMMETRIC or not _LEAST_ROOM <= axis <= 1.0 - _LEAST_ROOM:
-            return None
-        return None if start is not None and images_of(start, axis) is None else axis
+        return _axis_of_both(silhouette, start)
     if isinstance(symmetry, str):
         raise ConfigError(f"symmetry {symmetry!r}: expected {AUTO!r}, True or the x of the axis")
-    axis = best_axis(silhouette) if symmetry is True else number("symmetry", symmetry)
-    if not _LEAST_ROOM <= axis <= 1.0 - _LEAST_ROOM:
+    axis = _best_axis(silhouette, start) if symmetry is True else number("symmetry", symmetry)
+    if axis is None:
+        raise ConfigError(
+            "the outline of the start mesh is not symmetric about any upright line: leave symmetry out "
+            "(--symmetry off), or build the start with it (--symmetry best without --start)"
+        )
+    if not _has_room(axis):
         raise ConfigError(f"symmetry about x = {axis:g}: expected an axis well inside the unit square, such as 0.5")
     return axis
+
+
+def _axis_of_both(silhouette: Silhouette, start: PolyMesh | None) -> float | None:
+    """The axis where the start, if there is one, has it and the silhouette nearly so; else None."""
+    axis = _best_axis(silhouette, start)
+    is_so = axis is not None and _has_room(axis) and asymmetry(silhouette, axis) <= MOST_ASYMMETRIC
+    return axis if is_so else None
+
+
+def _best_axis(silhouette: Silhouette, start: PolyMesh | None) -> float | None:
+    """The axis that suits the silhouette best; of a start that has another one that axis, None where it has none."""
+    axis = best_axis(silhouette)
+    return axis if start is None or images_of(start, axis) is not None else axis_of(start)
+
+
+def _has_room(axis: float) -> bool:
+    return _LEAST_ROOM <= axis <= 1.0 - _LEAST_ROOM
 
 
 def _check_images_locked(mesh: PolyMesh, locked: frozenset[int], axis: float) -> None:
