@@ -2,10 +2,11 @@
 
 import json
 import os
+import re
 from collections.abc import Iterable, Iterator
-from dataclasses import is_dataclass
+from dataclasses import fields, is_dataclass
 from functools import cache
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_type_hints
 
 import yaml
 from pydantic import TypeAdapter, ValidationError
@@ -128,7 +129,8 @@ def validated(kind: type[_Config], values: dict[str, Any], what: str = "") -> _C
     """A config of a dataclass from plain values.
 
     Raises ConfigError for the first value that does not fit or is no finite number of 64 bits, its message beginning
-    with `what` and the value's key; errors of the dataclass itself come as they are.
+    with `what` and the value's key. Errors of the dataclass itself come as they are, those of a section, which does not
+    know its own name, with that before them.
     """
     hashable: Any = kind  # as classes are, which mypy does not believe
     try:
@@ -136,10 +138,28 @@ def validated(kind: type[_Config], values: dict[str, Any], what: str = "") -> _C
     except ValidationError as error:
         defect = first_defect(error)
         raise ConfigError(f"{what}{defect}, got {short(defect.value)}") from None
+    except ConfigError as error:
+        raise ConfigError(f"{_section_of(kind, values, str(error))}{error}") from None
     for key, number in _numbers_in(config):
         if not -LARGEST <= number <= LARGEST:
             raise ConfigError(f"{what}{key}: expected a finite number of at most 64 bits, got {short(number)}")
     return config
+
+
+def _section_of(kind: type[Any], values: dict[str, Any], problem: str) -> str:
+    """Where the setting stands with whose name a problem begins, as in "run."; empty where that is in no section."""
+    for name, section in get_type_hints(kind).items():
+        if not (is_dataclass(section) and isinstance(section, type) and isinstance(values.get(name), dict)):
+            continue
+        try:
+            _adapter(section).validate_python(values[name])
+        except ValidationError:
+            continue  # whoever calls has told of that
+        except ConfigError as error:
+            is_its_own = re.split(r"\W", str(error))[0] in {field.name for field in fields(section)}
+            if str(error) == problem:
+                return f"{name}." if is_its_own else _section_of(section, values[name], problem)
+    return ""
 
 
 def _numbers_in(value: Any, key: str = "") -> Iterator[tuple[str, int | float]]:

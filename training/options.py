@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 from collections.abc import Collection
 from dataclasses import asdict
 from pathlib import Path
@@ -27,7 +28,12 @@ def read_config(path: str | os.PathLike[str] | None, overrides: list[str], defau
         nested: dict[Any, Any] = {}
         put_override(nested, override, f"override {override!r}", "optim.lr=1e-3")
         _merge(values, nested, f"override {override!r}")
-    return build_config(type(default), values, "the config" if path is None else str(path))
+    try:
+        return validated(type(default), values)
+    except ConfigError as error:
+        typed = [override for override in overrides if re.match(_key_of(override), str(error))]
+        where = f"override {typed[-1]!r}" if typed else "the config" if path is None else path
+        raise ConfigError(f"{where}: {error}") from None
 
 
 def build_config(kind: type[_Config], values: dict[str, Any], where: str) -> _Config:
@@ -82,6 +88,11 @@ def _first_difference(one: Any, other: Any, harmless: Collection[str], key: str 
         if found:
             return found
     return ""
+
+
+def _key_of(override: str) -> str:
+    """A pattern of the key of `key=value`, or of what is in it."""
+    return re.escape(override.partition("=")[0]) + r"\b"
 
 
 def _merge(values: dict[str, Any], given: dict[Any, Any], where: str) -> None:

@@ -134,7 +134,7 @@ class CurriculumConfig:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.until <= 1.0:
-            raise ConfigError(f"until {self.until}: expected a share of the training, above 0 and at most 1")
+            raise ConfigError(f"until={short(self.until)}: expected a share of the training, above 0 and at most 1")
 
 
 @dataclass(frozen=True)
@@ -196,4 +196,4 @@ def _check(options: Any, **least: int) -> None:
     for name, bound in {**least, "max_grad_norm": 0, "ent_coef": 0, "vf_coef": 0}.items():
         at_least(bound, **{name: getattr(options, name, bound)})
     if not 0.0 <= options.gamma <= 1.0:
-        raise ConfigError(f"gamma = {options.gamma}: expected a discount, 0 to 1")
+        raise ConfigError(f"gamma={short(options.gamma)}: expected a discount, 0 to 1")

@@ -252,7 +252,7 @@ def test_config__is_the_file_and_then_the_overrides(tmp_path: Path) -> None:
         ("optim.rate=1", r"unknown option 'rate'; give one of lr, "),
         ("optim=1", r"'optim' is a section; give one of its options"),
         ("optim.lr=fast", r"optim\.lr: .* got 'fast'"),
-        ("optim.lr=-1", r"^the config: lr=-1\.0: expected a number above 0$"),
+        ("optim.lr=-1", r"^override 'optim\.lr=-1': optim\.lr=-1\.0: expected a number above 0$"),
         ("optim.lr", r"expected key=value, such as optim\.lr=1e-3"),
         ("net.inputs=[sound]", r"net\.inputs\.0: "),
         ("net.n=[", r"not YAML"),

@@ -244,7 +244,10 @@ def test_command__trains_and_exports(
     [
         (["algorithm=sarsa"], "algorithm"),
         (["ppo.n_stepz=3"], "unknown option 'n_stepz'"),
-        (["ppo.batch_size=0"], "batch_size=0: expected a number of at least 2"),
+        (["ppo.batch_size=0"], "error: override 'ppo.batch_size=0': ppo.batch_size=0: expected a number of at least 2"),
+        (["run.minutes=-1"], "run.minutes=-1.0: expected a number of at least 0"),
+        (["ppo.gamma=2", "run.seed=3"], "error: override 'ppo.gamma=2': ppo.gamma=2.0: expected a discount, 0 to 1"),
+        (["env.obs_resolution=0"], "env.obs_resolution"),
         (["run.n_envs=1"], "1 environments for 2 tasks"),
         (["env.operators=melt"], "operators 'melt' are unknown"),
         (["env.courses=[{targets: nowhere}]"], "nowhere"),
