@@ -17,7 +17,7 @@ import time
 from collections.abc import Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import NoReturn
+from typing import IO, NoReturn
 
 
 @contextlib.contextmanager
@@ -109,13 +109,32 @@ def ensure() -> None:
 
 @contextlib.contextmanager
 def _turn(path: Path) -> Iterator[None]:
-    """Where one process waits for another that does the same. It goes on at once where the system cannot do that."""
+    """Where one process waits for another that does the same, and says so; not where the system cannot do that."""
     with path.open("w") as stream:
-        with contextlib.suppress(ImportError):
-            import fcntl
-
-            fcntl.flock(stream, fcntl.LOCK_EX)
+        began = said = time.monotonic()
+        is_ours = _is_locked(stream)
+        if not is_ours:
+            _say("another process is compiling the numeric kernels, once on this machine: waiting for it ...")
+        while not is_ours:
+            if time.monotonic() - said > _PULSE:
+                said = time.monotonic()
+                _say(f"  waiting, {said - began:.0f} s")
+            time.sleep(0.05)
+            is_ours = _is_locked(stream)
         yield
+
+
+def _is_locked(stream: IO[str]) -> bool:
+    """Lock an open file, unless another process has done so; whether it is ours now, or can be nobody's."""
+    try:
+        import fcntl
+
+        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except ImportError:
+        pass
+    return True
 
 
 def _begin(part: str) -> subprocess.Popen[bytes]:

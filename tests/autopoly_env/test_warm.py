@@ -71,6 +71,30 @@ def test_nowhere_to_keep_them__means_that_nothing_is_begun(begun: list[str], mon
     assert not begun
 
 
+def test_process_that_waits_for_another__says_so_and_compiles_nothing(
+    begun: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The other one is done when it has been told twice that it is waited for."""
+    fcntl = pytest.importorskip("fcntl")
+    note = warm._note()
+    assert note is not None
+    monkeypatch.setattr(warm, "_PULSE", 0.0)
+    said: list[str] = []
+    with note.with_suffix(".lock").open("w") as other:
+        fcntl.flock(other, fcntl.LOCK_EX)
+
+        def say(line: str) -> None:
+            said.append(line)
+            if len(said) == 2:
+                note.touch()
+                fcntl.flock(other, fcntl.LOCK_UN)
+
+        monkeypatch.setattr(warm, "_say", say)
+        warm.ensure()
+    assert said[0].startswith("another process is compiling the numeric kernels") and said[1].startswith("  waiting, ")
+    assert not begun
+
+
 COMMANDS = (
     "agents.solve examples/mug.png --refits 60 --out OUT/mug",
     "agents.solve examples/key.png --style modeller --refits 60 --out OUT/key",
