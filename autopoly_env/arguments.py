@@ -52,6 +52,13 @@ def above(bound: float, **values: float) -> None:
             raise ConfigError(f"{name}={short(value)}: expected a number above {bound:g}")
 
 
+def share(**values: float) -> None:
+    """Raise ConfigError that names the first of the values which is not from 0 to 1."""
+    for name, value in values.items():
+        if not 0.0 <= value <= 1.0:
+            raise ConfigError(f"{name}={short(value)}: expected a share, 0 to 1")
+
+
 def number(name: str, value: Any) -> float:
     """The value, a finite number. Raises ConfigError otherwise."""
     found = float("nan")

@@ -70,7 +70,7 @@ def train_rl(config: TrainRlConfig, folder: Path, trust: bool = False) -> RunSta
             put_net(model.policy, initial_net(config, trust))
         session = Session(config, folder, state, lr)
         if not session.is_over:
-            print(_banner(config, folder, state), flush=True)
+            print(_banner(config, folder, state, str(model.device)), flush=True)
             with Pulse(session.stands):
                 with progress_bar(session.last_step, "steps", n_done=state.step, takes_prints=True) as session.bar:
                     model.learn(run.total_steps - state.step, session, log_interval=None, reset_num_timesteps=False)  # type: ignore[arg-type]
@@ -80,7 +80,7 @@ def train_rl(config: TrainRlConfig, folder: Path, trust: bool = False) -> RunSta
     return state
 
 
-def _banner(config: TrainRlConfig, folder: Path, state: RunState) -> str:
+def _banner(config: TrainRlConfig, folder: Path, state: RunState, device: str) -> str:
     """What is about to happen."""
     run = config.run
     limit = f", {run.minutes:g} minutes at most with all exams" if run.minutes else ""
@@ -88,7 +88,7 @@ def _banner(config: TrainRlConfig, folder: Path, state: RunState) -> str:
     whole = f" ({asked} rounded up to whole rollouts of {config.rollout})" if n_steps > asked else ""
     first = "before the first step, then " if run.init and not state.step else ""
     return (
-        f"{config.algorithm} in {folder}: {run.n_envs} environments ({run.envs}) on {run.device}, "
+        f"{config.algorithm} in {folder}: {run.n_envs} environments ({run.envs}) on {device}, "
         f"{n_steps} steps{whole}{limit}\n"
         f"exams: {first}every {run.eval_every} steps, on {run.n_eval} unseen targets of each of "
         f"{len(config.env.courses)} tasks; steps a second and when the next exam comes are said after the first update"

@@ -29,10 +29,14 @@ class ChoiceConfig:
     def __post_init__(self) -> None:
         if not self.classes or len(set(self.classes)) < len(self.classes):
             raise ConfigError(f"classes {', '.join(self.classes)}: expected one or more, none twice")
-        if not self.rules or not 0.0 < self.w_sc[0] <= self.w_sc[1] < math.inf:
-            raise ConfigError(f"rules {self.rules}, w_sc {self.w_sc}: expected a rule, and two prices, the lower first")
-        if not (2 <= self.side <= 32 and 6 <= self.width <= 1024):
-            raise ConfigError(f"side {self.side}, width {self.width}: expected 2 to 32 points and 6 to 1024 numbers")
+        if not self.rules:
+            raise ConfigError(f"rules={self.rules}: expected one or more")
+        if not 0.0 < self.w_sc[0] <= self.w_sc[1] < math.inf:
+            raise ConfigError(f"w_sc={self.w_sc}: expected two prices above 0, the lower first")
+        if not 2 <= self.side <= 32:
+            raise ConfigError(f"side={self.side}: expected 2 to 32 points")
+        if not 6 <= self.width <= 1024:
+            raise ConfigError(f"width={self.width}: expected 6 to 1024 numbers")
 
 
 @dataclass(frozen=True)

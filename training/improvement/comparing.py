@@ -14,9 +14,10 @@ from agents.choice.evaluator import ChoiceEvaluator
 from agents.choice.weights import load_choice
 from agents.search.evaluator import Evaluator, ResidualEvaluator
 from agents.search.mcts import MctsAgent
-from autopoly_env.errors import ConfigError, OutputError
+from autopoly_env.arguments import at_least
+from autopoly_env.errors import OutputError
 from autopoly_env.files import write_atomically
-from training.improvement.playing import made_target
+from training.improvement.playing import check_mixture, made_target
 from training.improvement.plays import Style, simulator_of, target_of
 from training.report import Interval, bootstrap_mean
 
@@ -31,10 +32,8 @@ class CompareConfig:
     refits: int = 100
 
     def __post_init__(self) -> None:
-        if min(self.n_targets, self.refits) < 1 or not 0.0 <= self.modeller <= 1.0:
-            raise ConfigError(f"{self}: expected n_targets and refits of at least 1, a share modeller of 0 to 1")
-        if not 0.0 < self.w_sc[0] <= self.w_sc[1] < math.inf:
-            raise ConfigError(f"w_sc = {self.w_sc}: expected two prices above 0, the lower first")
+        at_least(1, n_targets=self.n_targets, refits=self.refits)
+        check_mixture(self.modeller, self.w_sc)
 
 
 def evaluator_of(weights: str) -> Evaluator:

@@ -11,8 +11,10 @@ from torch.nn import functional
 
 from agents.choice.config import ChoiceConfig
 from agents.choice.network import batch_of
+from autopoly_env.arguments import above, at_least
 from autopoly_env.arrays import AnyArray
 from autopoly_env.errors import ConfigError, RunError
+from autopoly_env.shown import short
 from training.improvement.lessons import Lesson, drawn
 from training.improvement.network import ChoiceModule, TensorBatch
 
@@ -32,10 +34,11 @@ class LearnConfig:
     measured: float = 0.1  # share of the targets that is kept to measure with
 
     def __post_init__(self) -> None:
-        if not (self.lr > 0.0 and self.weight_decay >= 0.0 and self.value >= 0.0 and 0.0 < self.measured < 1.0):
-            raise ConfigError(f"{self}: expected lr above 0, weight_decay and value of at least 0, measured in 0..1")
-        if self.n_steps < 1 or self.batch_size < 1:
-            raise ConfigError(f"{self}: expected n_steps and batch_size of at least 1")
+        above(0, lr=self.lr)
+        at_least(0, weight_decay=self.weight_decay, value=self.value)
+        at_least(1, n_steps=self.n_steps, batch_size=self.batch_size)
+        if not 0.0 < self.measured < 1.0:
+            raise ConfigError(f"measured={short(self.measured)}: expected a share above 0, below 1")
 
 
 def learn(

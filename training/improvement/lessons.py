@@ -10,8 +10,8 @@ import numpy as np
 
 from agents.choice.config import ChoiceConfig
 from agents.choice.features import Look, look
+from autopoly_env.arguments import above, at_least
 from autopoly_env.arrays import Float32Array, FloatArray
-from autopoly_env.errors import ConfigError
 from autopoly_env.operators import Action
 from autopoly_env.simulator import State
 from training.improvement.plays import Play, SearchedState
@@ -28,8 +28,9 @@ class LabelConfig:
     n_least: int = 12  # visits of a state that says what there is to gain
 
     def __post_init__(self) -> None:
-        if not self.temperature > 0.0 or not self.least_gain >= 0.0 or self.n_least < 1:
-            raise ConfigError(f"{self}: expected a temperature above 0, a least gain of at least 0, a visit or more")
+        above(0, temperature=self.temperature)
+        at_least(0, least_gain=self.least_gain)
+        at_least(1, n_least=self.n_least)
 
 
 @dataclass(frozen=True)

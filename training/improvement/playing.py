@@ -15,13 +15,22 @@ from agents.search.evaluator import Evaluator
 from agents.search.mcts import MctsAgent
 from agents.search.tree import Node
 from agents.solution import Track
+from autopoly_env.arguments import at_least, share
 from autopoly_env.errors import ConfigError
+from autopoly_env.shown import short
 from autopoly_env.simulator import Simulator
 from autopoly_env.targets import HELD_OUT, LEARNING
 from training.improvement.plays import Play, SearchedState, Style, simulator_of, target_of
 
 _KINDS = ("objects", "construction")
 _N_BOLDER = 4.0  # exploration of each run, in that of the one before
+
+
+def check_mixture(modeller: float, w_sc: tuple[float, float]) -> None:
+    """Raise ConfigError for a share of targets in the modeller's style, or a range of prices, that is none."""
+    share(modeller=modeller)
+    if not 0.0 < w_sc[0] <= w_sc[1] < math.inf:
+        raise ConfigError(f"w_sc={short(w_sc)}: expected two prices above 0, the lower first")
 
 
 @dataclass(frozen=True)
@@ -38,12 +47,9 @@ class PlayConfig:
     n_least: int = 4  # visits of a state that is kept
 
     def __post_init__(self) -> None:
-        if min(self.n_first, self.n_plays, self.refits, self.n_runs, self.n_states, self.n_least) < 1:
-            raise ConfigError(f"{self}: expected n_first, n_plays, refits, n_runs, n_states and n_least of at least 1")
-        if not 0.0 <= self.modeller <= 1.0:
-            raise ConfigError(f"modeller = {self.modeller}: expected a share, 0 to 1")
-        if not 0.0 < self.w_sc[0] <= self.w_sc[1] < math.inf:
-            raise ConfigError(f"w_sc = {self.w_sc}: expected two prices above 0, the lower first")
+        at_least(1, n_first=self.n_first, n_plays=self.n_plays, refits=self.refits)
+        at_least(1, n_runs=self.n_runs, n_states=self.n_states, n_least=self.n_least)
+        check_mixture(self.modeller, self.w_sc)
 
     def n_of(self, round_: int) -> int:
         """Targets of a round, from 1 on."""

@@ -11,7 +11,8 @@ from typing import TypeVar
 from agents.choice.config import ChoiceConfig
 from agents.choice.weights import load_choice, save_choice
 from agents.commands.pulse import Pulse
-from autopoly_env.errors import ConfigError, RunError
+from autopoly_env.arguments import at_least
+from autopoly_env.errors import RunError
 from autopoly_env.files import write_atomically
 from training.improvement.comparing import CompareConfig, Totals, evaluator_of, held_out_total
 from training.improvement.learning import LearnConfig, learn
@@ -34,8 +35,8 @@ class RoundsConfig:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if self.n_rounds < 1 or self.seed < 0:
-            raise ConfigError(f"{self}: expected n_rounds of at least 1 and a seed of at least 0")
+        at_least(1, n_rounds=self.n_rounds)
+        at_least(0, seed=self.seed)
 
 
 @dataclass(frozen=True)

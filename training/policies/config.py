@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from agents.rl.config import NetConfig, SpaceSpec, TaskSpec
-from autopoly_env.arguments import above, at_least
+from autopoly_env.arguments import above, at_least, share
 from autopoly_env.errors import ConfigError
 from autopoly_env.operators import preset
 from autopoly_env.shown import short
@@ -60,8 +60,7 @@ class LearningRateConfig:
 
     def __post_init__(self) -> None:
         above(0, lr=self.lr)
-        if not 0.0 <= self.last <= 1.0:
-            raise ConfigError(f"last={short(self.last)}: expected a share, 0 to 1")
+        share(last=self.last)
         if not 0.0 <= self.warmup < 1.0:
             raise ConfigError(f"warmup={short(self.warmup)}: expected a share from 0, below 1")
 

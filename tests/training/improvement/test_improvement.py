@@ -30,6 +30,7 @@ from training.improvement.lessons import LabelConfig, Lesson, lessons_of, mirror
 from training.improvement.network import ChoiceModule
 from training.improvement.playing import PlayConfig, _best_below, _way_to_best, made_target, play
 from training.improvement.plays import Play
+from training.improvement.rounds import RoundsConfig
 
 QUICK = PlayConfig(refits=25, n_runs=1)
 SETTINGS = [
@@ -242,7 +243,7 @@ def test_command__refuses_a_folder_of_other_settings_and_a_torn_play(
     assert improve.main([*arguments, "play.refits=26"]) == 1
     assert "belongs to a run with another play.refits" in capsys.readouterr().err
     assert improve.main(["play.n_first=0"]) == 2
-    assert "expected n_first" in capsys.readouterr().err
+    assert "play.n_first=0: expected a number of at least 1" in capsys.readouterr().err
 
 
 @pytest.mark.slow
@@ -273,11 +274,14 @@ def test_run__that_is_killed_goes_on_and_ends_as_one_that_was_not(tmp_path: Path
         (PlayConfig, {"w_sc": (0.0, 1.0)}),
         (LabelConfig, {"temperature": 0.0}),
         (LearnConfig, {"measured": 1.0}),
+        (LearnConfig, {"n_steps": 0}),
+        (RoundsConfig, {"n_rounds": 0}),
         (CompareConfig, {"refits": 0}),
         (ChoiceConfig, {"classes": ("edge_cap", "edge_cap")}),
         (ChoiceConfig, {"w_sc": (2.0, 1.0)}),
     ],
 )
 def test_settings__out_of_range_are_refused(kind: type, settings: dict[str, object]) -> None:
-    with pytest.raises(ConfigError, match="expected"):
+    (name,) = settings
+    with pytest.raises(ConfigError, match=f"^{name}.*: expected "):
         kind(**settings)

@@ -232,7 +232,8 @@ def test_command__trains_and_exports(
     monkeypatch.setattr("agents.rl.weights.SHIPPED", tmp_path / "weights")
     arguments = ["--config", str(written(tmp_path)), "--out", str(tmp_path / "run"), "run.total_steps=128", "--export"]
     assert train_rl.main(arguments) == 0
-    assert "exported to" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "exported to" in said and " on auto, " not in said
     assert make_agent("maskable-ppo").name == "maskable-ppo" and make_agent("rl-prior").name == "rl-prior"
     card = (tmp_path / "weights" / "maskable_ppo.md").read_text()
     assert "w_sc 0.3" in card and "`python -m training.train_rl " in card
