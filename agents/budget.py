@@ -181,10 +181,7 @@ class Meter:
         return list(islice(starts, self.rest().refits))
 
     def stats(self) -> Stats:
-        """The work so far; who is done but has gone over the budget of refits is marked as stopped by it."""
-        most = self._budget.refits
-        if self.stopped_by == "finished" and most is not None and self._n_refits > most:
-            self.stopped_by = "refits"
+        """The work so far."""
         return Stats(self._n_refits, self._seconds(), self.stopped_by)
 
     def _seconds(self) -> float:

@@ -48,6 +48,7 @@ def _finish(
     if not (keep_steps or meter.stopped_by == "interrupted" or meter.spent()):
         pared, n_refits, n_taken = pare(simulator, states)
         meter.add_refits(n_refits)
+        meter.spent()  # which marks a solve that has gone over its budget only now
         versions += [pared] if n_taken else []
     solutions = [_told(simulator, version, meter, keep_steps, keep_shape) for version in versions]
     return max(solutions, key=lambda solution: simulator.worth(solution.mesh))
