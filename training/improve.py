@@ -18,7 +18,7 @@ import typer
 from agents.commands.running import GOES_ON, run_command
 from training.improvement.rounds import ImproveConfig, Workers, improve
 from training.options import claim_run, plain, read_config
-from training.telling import settings_of
+from training.telling import show_config_option
 
 HELP = """Improve the prior of the tree search by what the search itself finds, round by round.
 
@@ -36,12 +36,6 @@ run that was stopped. See docs/learning.md.
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 
 
-def _show_config(wanted: bool) -> None:
-    if wanted:
-        print("\n".join(settings_of(ImproveConfig())))
-        raise typer.Exit
-
-
 @app.command(help=HELP)
 def main_command(
     overrides: Annotated[list[str] | None, typer.Argument(metavar="SECTION.KEY=VALUE")] = None,
@@ -51,15 +45,7 @@ def main_command(
     workers: Annotated[int | None, typer.Option(min=1, help="Processes.", show_default="as many as cores")] = None,
     engine: Annotated[str, typer.Option(help="serial, process or ray.")] = "process",
     ray_address: Annotated[str | None, typer.Option(help="Of a Ray cluster.")] = None,
-    show_config: Annotated[
-        bool,
-        typer.Option(
-            "--show-config",
-            callback=_show_config,
-            is_eager=True,
-            help="Print every SECTION.KEY with its value and meaning, and do no more.",
-        ),
-    ] = False,
+    show_config: Annotated[bool, show_config_option(ImproveConfig(), "SECTION.KEY with its value")] = False,
 ) -> int:
     settings = read_config(config, overrides or [], ImproveConfig())
     claim_run(out, plain(settings), ())

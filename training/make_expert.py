@@ -17,7 +17,7 @@ from training.networks.labelling import SourceConfig, build_trajectory
 from training.networks.trajectories import VERSION, Shard
 from training.options import plain, read_config
 from training.parallel import map_tasks, n_cores
-from training.telling import duration, settings_of
+from training.telling import duration, show_config_option
 
 SHARD_SIZE = 64  # constructions
 
@@ -37,12 +37,6 @@ there are kept: the same command goes on with a run that was stopped, and a larg
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 
 
-def _show_config(wanted: bool) -> None:
-    if wanted:
-        print("\n".join(settings_of(SourceConfig())))
-        raise typer.Exit
-
-
 @app.command(help=HELP)
 def make(
     folder: Annotated[Path, typer.Argument(help="For the shards; made if it is not there.")],
@@ -53,15 +47,7 @@ def make(
     workers: Annotated[int | None, typer.Option(min=1, help="Processes.", show_default="as many as cores")] = None,
     engine: Annotated[str, typer.Option(help="serial, process or ray.")] = "process",
     ray_address: Annotated[str | None, typer.Option(help="Of a Ray cluster.")] = None,
-    show_config: Annotated[
-        bool,
-        typer.Option(
-            "--show-config",
-            callback=_show_config,
-            is_eager=True,
-            help="Print every KEY with its default and meaning, and do no more.",
-        ),
-    ] = False,
+    show_config: Annotated[bool, show_config_option(SourceConfig(), "KEY with its default")] = False,
 ) -> int:
     source = read_config(config, overrides or [], SourceConfig())
     _claim(folder, {"version": VERSION, "held_out": held_out, "source": plain(source)})

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, fields, is_dataclass
 from typing import Any
 
+import typer
+
 BASELINES = ("residual", "majority", "chance", "least")  # how names of metrics end that others are measured against
 _FIELD = re.compile(r"^    (\w+): [^#\n]*?(?:  # (.*))?$", re.MULTILINE)
 
@@ -30,6 +32,18 @@ def settings_of(config: Any, prefix: str = "") -> list[str]:
             meaning = meanings.get(one.name, "")
             lines.append(f"{name} = {_written(value)}" + (f"  # {meaning}" if meaning else ""))
     return lines
+
+
+def show_config_option(settings: Any, what: str) -> Any:
+    """The option --show-config of a command, which prints `settings` and does no more; `what` it prints of each."""
+
+    def shown(wanted: bool) -> None:
+        if wanted:
+            print("\n".join(settings_of(settings)))
+            raise typer.Exit
+
+    help_text = f"Print every {what} and meaning, and do no more."
+    return typer.Option("--show-config", callback=shown, is_eager=True, help=help_text)
 
 
 def table_of(metrics: Mapping[str, float]) -> str:

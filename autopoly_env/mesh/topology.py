@@ -80,16 +80,13 @@ class Topology:
 
     def sides(self, edge: int) -> tuple[int, int]:
         """One of `edge_half_edges`."""
-        if self.n_corners < MANY:
-            return self.edge_half_edges[edge]
         lower, other = self.arrays.sides[edge].tolist()
         return lower, other
 
     def ends(self, half_edge: int) -> tuple[int, int]:
         """The vertices that a half-edge runs from and to."""
-        f, i = self.corner(half_edge)
-        face = self.faces[f]
-        return face[i], face[i + 1 - len(face)]
+        tail, head = self.arrays.half_edges[half_edge].tolist()
+        return tail, head
 
     def corner(self, half_edge: int) -> tuple[int, int]:
         """The face of a corner (= half-edge), and the corner's position in it."""

@@ -202,7 +202,7 @@ def rule_of(topology: Topology) -> Rule:
     unknown = np.empty(topology.n_vertices, np.int64)
     unknown[np.concatenate((shape.boundary, shape.inner))] = np.arange(topology.n_vertices)
     at = unknown[topology.corners]
-    following = np.array(topology.links.following, np.int64)
+    following = topology.arrays.following
     triples = np.empty((len(at), 3), np.int64)
     triples[following] = np.column_stack((at, at[following], at[following[following]]))
     return Rule(
