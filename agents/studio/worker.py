@@ -5,10 +5,9 @@ what the server has read and checked. A thread listens to orders, so that they a
 
 - `pause` and `go`: the search stands still between two of its steps, and its seconds do, too;
 - `stop`: as Ctrl-C of `agents.solve`; the best so far is finished and sent;
-- `drop`: the search is given up wherever it is, for another one waits.
+- `drop`: the search is given up before its next refit, for another one waits.
 """
 
-import _thread
 import os
 import queue
 import signal
@@ -26,6 +25,7 @@ from agents.commands.solving import solve_frame, solve_picture
 from agents.retell.retargeting import Retargeted, retarget, simulator_of
 from agents.studio.choices import Choices, Task
 from agents.studio.shapes import plain_mesh
+from autopoly_env.compute import set_check
 from autopoly_env.errors import AutoPolyError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.outside import described
@@ -47,48 +47,43 @@ class Orders:
     def __init__(self, pipe: Connection) -> None:
         self._pipe = pipe
         self._tasks: queue.SimpleQueue[tuple[int, Task]] = queue.SimpleQueue()
-        self._lock = threading.Lock()
         self._go = threading.Event()
         self._running = 0  # the number of the task in work, 0 between two
         self._dropped = self._stopped = 0  # the last task that is given up, or to be finished
         self._go.set()
-        signal.signal(signal.SIGINT, self._interrupt)
+        set_check(self.heed_drop)
+        signal.signal(signal.SIGINT, lambda *_: None)  # Ctrl-C on the terminal is for the server
         threading.Thread(target=self._listen, daemon=True).start()
 
     def next_task(self) -> tuple[int, Task]:
         """The next task and its number, as soon as there is one; those that were given up meanwhile are passed over."""
         while True:
-            try:
-                number, task = self._tasks.get(timeout=0.5)  # so that signals are heeded, on all systems
-            except queue.Empty:
-                continue
+            number, task = self._tasks.get()
             if number > self._dropped:
                 return number, task
 
     @contextmanager
     def working(self, number: int) -> Iterator[None]:
         """The task is in work. Raises DroppedError in it as soon as it is given up."""
-        with self._lock:
-            self._running = number
+        self._running = number
         try:
             self.heed()
             yield
+            self.heed_drop()
         finally:
-            with self._lock:
-                self._running = 0
+            self._running = 0
 
     def heed(self) -> None:
         """Stand still while paused; raise what ends the task in work."""
         if not self._go.is_set():
             with CLOCK.standing():
                 self._go.wait()
-        if self._dropped >= self._running:
-            raise DroppedError
+        self.heed_drop()
         if self._stopped >= self._running:
             raise KeyboardInterrupt
 
-    def _interrupt(self, *_: object) -> None:
-        """Called in the main thread; Ctrl-C on the terminal, which is for the server, changes nothing here."""
+    def heed_drop(self) -> None:
+        """Called before every refit, in its thread: raise DroppedError where the task in work is given up."""
         if 0 < self._running <= self._dropped:
             raise DroppedError
 
@@ -104,15 +99,11 @@ class Orders:
             elif word == "pause":
                 self._go.clear()
             else:
-                with self._lock:
-                    if word == "drop":
-                        self._dropped = max(self._dropped, number)
-                    elif word == "stop":
-                        self._stopped = max(self._stopped, number)
-                    is_running = self._running == number
+                if word == "drop":
+                    self._dropped = max(self._dropped, number)
+                elif word == "stop":
+                    self._stopped = max(self._stopped, number)
                 self._go.set()
-                if word == "drop" and is_running:
-                    _thread.interrupt_main()
 
 
 def main(pipe: Connection) -> None:

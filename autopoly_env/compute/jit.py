@@ -21,6 +21,7 @@ from typing import Any
 with warnings.catch_warnings(record=True) as _said:  # of its variables; a warning of Numba's has a traceback in it
     import numba
     from numba import njit, types
+    from numba.core import serialize
     from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
     from numba.core.registry import cpu_target
     from numba.core.runtime import rtsys
@@ -29,6 +30,11 @@ for _one in _said:
 
 ALONE = "AUTOPOLY_WARM"  # a variable of the environment: 0 in a process that is to compile what it calls by itself
 _announced = _sought = False
+
+# For every array that a kernel returns Numba looks up its type, by a function in Python. Where a signal comes just then
+# and its handler raises, as that of Ctrl-C does, Numba goes on without the type, and the process crashes. While C looks
+# into a cache of functools nothing of that kind happens.
+serialize._numba_unpickle = functools.cache(serialize._numba_unpickle)
 
 
 def _seek_all() -> None:

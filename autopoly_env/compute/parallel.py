@@ -13,6 +13,7 @@ from autopoly_env.shown import short
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
 _override: int | None = None
+_check: Callable[[], None] | None = None
 
 
 def n_threads() -> int:
@@ -35,6 +36,22 @@ def set_threads(threads: int | None) -> None:
     _override = threads
 
 
+def set_check(check: Callable[[], None] | None) -> None:
+    """Call `check` before each job of batched work from now on, in the thread that is to do it; None: call nothing.
+
+    What it raises gives the work up. That is sound where an exception out of a signal's handler, which may come up
+    in the midst of a lock or of compiled code, is not.
+    """
+    global _check
+    _check = check
+
+
+def check() -> None:
+    """What was set with `set_check`."""
+    if _check is not None:
+        _check()
+
+
 @cache
 def _pool(threads: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(threads, thread_name_prefix="autopoly")
@@ -50,11 +67,16 @@ def map_threads(function: Callable[[_Item], _Result], items: Iterable[_Item]) ->
     Worth it where `function` spends its time in kernels, which run without the GIL: the caller's thread then prepares
     the next item while the others compute.
     """
+
+    def checked(item: _Item) -> _Result:
+        check()
+        return function(item)
+
     if n_threads() == 1:
-        return [function(item) for item in items]
+        return [checked(item) for item in items]
     futures: list[Future[_Result]] = []
     try:
-        futures.extend(_pool(n_threads()).submit(function, item) for item in items)
+        futures.extend(_pool(n_threads()).submit(checked, item) for item in items)
         return [future.result() for future in futures]
     except BaseException:
         for future in futures:

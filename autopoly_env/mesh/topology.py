@@ -51,9 +51,10 @@ class Topology:
 
         Raises MeshError where a face has a vertex that there is not.
         """
-        is_sound, links = topology_kernels.links_of(self.corners, self.face_offsets, self.n_vertices)
+        is_sound, arrays = topology_kernels.links_of(self.corners, self.face_offsets, self.n_vertices)
         if not is_sound:
             raise MeshError(f"a face has a vertex beyond the {self.n_vertices} that there are; give indices from 0")
+        links = Links(*arrays)
         for array in (links.half_edges, links.owners, links.edges, links.boundary):  # which others are given
             _read_only(array)
         return links

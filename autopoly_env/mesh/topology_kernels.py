@@ -13,7 +13,10 @@ from autopoly_env.compute import kernel
 
 
 class Links(NamedTuple):
-    """The half-edges, the edges and the boundary as arrays, all int64; numbered as `Topology` says."""
+    """The half-edges, the edges and the boundary as arrays, all int64; numbered as `Topology` says.
+
+    What `links_of` gives, with names: a kernel that made them would call this class, and so Python, on its way out.
+    """
 
     half_edges: IntArray  # (H, 2) from, to
     owners: IntArray  # (H,) the face of each
@@ -33,8 +36,8 @@ class Links(NamedTuple):
 
 
 @kernel
-def links_of(corners: IntArray, offsets: IntArray, n_vertices: int) -> tuple[bool, Links]:
-    """What follows from the faces' `corners` (H,), face f being offsets[f]:offsets[f+1].
+def links_of(corners: IntArray, offsets: IntArray, n_vertices: int) -> tuple[bool, tuple[IntArray, ...]]:
+    """The `Links` that follow from the faces' `corners` (H,), face f being offsets[f]:offsets[f+1].
 
     False, and nothing of use, where there is no vertex of some number.
     """
@@ -54,11 +57,8 @@ def links_of(corners: IntArray, offsets: IntArray, n_vertices: int) -> tuple[boo
     rim, loop_ends = _rim(following, twins)
     outer, boundary, loops, row_of = _outline(half_edges, rim, n_vertices)
     inner, neighbours, neighbour_offsets = _inside(edges, row_of, len(outer))
-    links = Links(
-        *(half_edges, owners, following, twins, edges, sides, edge_of, rim, boundary, loop_ends),
-        *(outer, loops, inner, neighbours, neighbour_offsets),
-    )
-    return is_sound, links
+    first = half_edges, owners, following, twins, edges, sides, edge_of, rim, boundary, loop_ends
+    return is_sound, first + (outer, loops, inner, neighbours, neighbour_offsets)
 
 
 @kernel

@@ -1,14 +1,19 @@
 """Kernels are compiled once, and never run as an older source said."""
 
+import importlib
 import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import FrameType
+from typing import get_args, get_type_hints
 
+import numpy as np
 import pytest
 
 from autopoly_env.compute import jit
+from autopoly_env.mesh.topology_kernels import links_of
 
 pytestmark = pytest.mark.slow  # kernels are compiled from nothing
 
@@ -133,6 +138,37 @@ def test_cache__never_shows_the_code_of_an_older_source(tmp_path: Path, monkeypa
     monkeypatch.setattr(new, "_save_index", look_after)
     new.save("float", "new code")
     assert found == [None, "new code"]
+
+
+def test_kernel__calls_no_python_on_its_way_out() -> None:
+    """A signal's handler, as that of Ctrl-C, may raise in any Python; Numba would crash where that is its own."""
+    square = np.array([0, 1, 2, 3]), np.array([0, 4]), 4
+    links_of(*square)  # the first call is for what Numba looks up once
+    called: list[str] = []
+
+    def note(frame: FrameType, event: str, _: object) -> None:
+        if event == "call":
+            called.append(frame.f_code.co_qualname)
+
+    sys.setprofile(note)
+    try:
+        is_sound, (half_edges, *_) = links_of(*square)
+    finally:
+        sys.setprofile(None)
+    assert is_sound and half_edges.tolist() == [[0, 1], [1, 2], [2, 3], [3, 0]]
+    assert called == ["links_of"]  # machine code: Numba tells profilers of it
+
+
+def test_kernels__give_python_no_named_tuples() -> None:
+    """Their classes are Python, which a kernel is not to call."""
+    given = []
+    for path in [path for room in ("autopoly_env", "agents") for path in (PACKAGE.parent / room).rglob("*_kernels.py")]:
+        module = importlib.import_module(".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts))
+        outer = [one for name, one in vars(module).items() if hasattr(one, "py_func") and not name.startswith("_")]
+        given += [get_type_hints(one.py_func)["return"] for one in outer]
+    kinds = {kind for one in given for kind in (one, *get_args(one))}
+    assert len(given) > 20
+    assert not [kind for kind in kinds if hasattr(kind, "_fields")]
 
 
 def test_kernels__all_go_through_this_cache() -> None:

@@ -3,11 +3,12 @@
 import os
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
-from autopoly_env.compute import map_threads, n_threads, parallel, set_threads
+from autopoly_env.compute import map_threads, n_threads, parallel, set_check, set_threads
 from autopoly_env.errors import ConfigError
 from tests.helpers.paths import ROOT
 
@@ -16,6 +17,24 @@ from tests.helpers.paths import ROOT
 def default_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("AUTOPOLY_THREADS", raising=False)
     monkeypatch.setattr(parallel, "_override", None)
+
+
+@pytest.fixture
+def no_check_afterwards() -> Iterator[None]:
+    yield
+    set_check(None)
+
+
+class GivenUpError(BaseException):
+    """As the studio gives a search up."""
+
+
+def raising_where(is_enough: Callable[[], bool]) -> Callable[[], None]:
+    def check() -> None:
+        if is_enough():
+            raise GivenUpError
+
+    return check
 
 
 @pytest.mark.usefixtures("default_threads")
@@ -51,6 +70,19 @@ def test_map_threads__keeps_the_order_and_passes_errors_on(threads: int) -> None
     with pytest.raises(ZeroDivisionError):
         map_threads(lambda x: 1 // x, [2, 1, 0, 3])
     assert map_threads(str, [1]) == ["1"]
+
+
+@pytest.mark.usefixtures("default_threads", "no_check_afterwards")
+@pytest.mark.parametrize("threads", [1, 2, 3])
+def test_check__gives_the_work_up_between_two_jobs(threads: int) -> None:
+    set_threads(threads)
+    done: list[int] = []
+    set_check(raising_where(lambda: len(done) >= 5))
+    with pytest.raises(GivenUpError):
+        map_threads(done.append, range(1000))
+    assert 5 <= len(done) <= 5 + threads  # those that had begun
+    set_check(None)
+    assert map_threads(abs, range(20)) == list(range(20))
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="nothing forks here")

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from autopoly_env.compute import Routine, run, run_all, set_threads
+from autopoly_env.compute import Routine, run, run_all, set_check, set_threads
 
 
 @pytest.fixture(params=[1, 2, 3], ids=lambda n: f"{n} threads")
@@ -80,6 +80,28 @@ def one_job(job: Any) -> Routine[Any]:
 def test_error_of_a_job__comes_out_and_leaves_the_threads_usable(threads: int) -> None:
     with pytest.raises(ValueError, match="a job went wrong"):
         run_all([sum_of_squares(3), one_job(broken), sum_of_squares(30)])
+    assert run_all([sum_of_squares(2)]) == [expected(2)]
+
+
+@pytest.mark.parametrize("go", [run, lambda routine: run_all([routine, sum_of_squares(2)])])
+def test_check__gives_the_routines_up_before_a_job(go: Any, threads: int) -> None:
+    done: list[int] = []
+
+    def check() -> None:
+        if len(done) >= 5:
+            raise KeyboardInterrupt  # no Exception, as that by which the studio gives a search up
+
+    def routine() -> Routine[None]:
+        while True:
+            yield [partial(done.append, 1)]
+
+    set_check(check)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            go(routine())
+    finally:
+        set_check(None)
+    assert len(done) == 5
     assert run_all([sum_of_squares(2)]) == [expected(2)]
 
 
