@@ -102,26 +102,42 @@ def ensure() -> None:
     note = _note()
     if note is None or note.exists():
         return
-    with contextlib.suppress(OSError), _turn(note.with_suffix(".lock")):
-        if not note.exists() and compile_all():
+    with _turn(note):
+        if not note.exists():
+            _compile_and_note(note)
+
+
+def _compile_and_note(note: Path | None) -> bool:
+    """Compile all kernels, and keep a note of it. Returns whether all went well."""
+    is_well = compile_all()
+    if is_well and note is not None:
+        with contextlib.suppress(OSError):
             note.touch()
+    return is_well
 
 
 @contextlib.contextmanager
-def _turn(path: Path) -> Iterator[None]:
+def _turn(note: Path | None) -> Iterator[None]:
     """Where one process waits for another that does the same, and says so; not where the system cannot do that."""
-    with path.open("w") as stream:
-        began = said = time.monotonic()
-        is_ours = _is_locked(stream)
-        if not is_ours:
-            _say("another process is compiling the numeric kernels, once on this machine: waiting for it ...")
-        while not is_ours:
-            if time.monotonic() - said > _PULSE:
-                said = time.monotonic()
-                _say(f"  waiting, {said - began:.0f} s")
-            time.sleep(0.05)
-            is_ours = _is_locked(stream)
+    with contextlib.ExitStack() as stack:
+        with contextlib.suppress(OSError):
+            if note is not None:
+                _wait_for(stack.enter_context(note.with_suffix(".lock").open("w")))
         yield
+
+
+def _wait_for(stream: IO[str]) -> None:
+    """Lock an open file, as soon as no other process has done so."""
+    began = said = time.monotonic()
+    is_ours = _is_locked(stream)
+    if not is_ours:
+        _say("another process is compiling the numeric kernels, once on this machine: waiting for it ...")
+    while not is_ours:
+        if time.monotonic() - said > _PULSE:
+            said = time.monotonic()
+            _say(f"  waiting, {said - began:.0f} s")
+        time.sleep(0.05)
+        is_ours = _is_locked(stream)
 
 
 def _is_locked(stream: IO[str]) -> bool:
@@ -243,16 +259,15 @@ def main(arguments: list[str] | None = None) -> int:
         getattr(import_module(module), name)()
         return 0
     try:
-        if not compile_all():
+        note = _note()
+        with _turn(note):
+            is_well = _compile_and_note(note)
+        if not is_well:
             print("error: not all kernels could be compiled; they are when they are called", file=sys.stderr)
             return 1
     except KeyboardInterrupt:
         print("error: stopped by Ctrl-C; what is compiled already stays", file=sys.stderr)
         return 130
-    note = _note()
-    if note is not None:
-        with contextlib.suppress(OSError):
-            note.touch()
     return 0
 
 

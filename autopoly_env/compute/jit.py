@@ -7,12 +7,14 @@ package and of its own, in whichever folder they lie.
 
 import contextlib
 import functools
+import glob
 import hashlib
 import inspect
 import multiprocessing
 import os
 import subprocess
 import sys
+import time
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -29,6 +31,7 @@ for _one in _said:
     print("autopoly_env:", str(_one.message).partition("\n")[0], file=sys.stderr)
 
 ALONE = "AUTOPOLY_WARM"  # a variable of the environment: 0 in a process that is to compile what it calls by itself
+_AGE = 3600.0  # seconds after which a file that no index lists is nobody's: not one that is just being filled
 _announced = _sought = False
 
 # For every array that a kernel returns Numba looks up its type, by a function in Python. Where a signal comes just then
@@ -115,7 +118,17 @@ class _CacheFile(IndexDataCacheFile):
         content = repr((self._version, self._source_stamp, key)).encode()
         name = self._data_name(int.from_bytes(hashlib.sha256(content).digest()[:8], "big"))
         self._save_data(name, data)
-        self._save_index({**self._load_index(), key: name})
+        listed = {**self._load_index(), key: name}
+        self._save_index(listed)
+        self._sweep({self._index_name, *listed.values()})
+
+    def _sweep(self, kept: set[str]) -> None:
+        """Remove what was compiled of older sources of this function, in whichever line it stood; see `_AGE`."""
+        function, _, line = self._index_name.removesuffix(".nbi").rpartition("-")
+        python = line.partition(".")[2]
+        for path in Path(self._cache_path).glob(f"{glob.escape(function)}-*.{python}.*"):
+            if path.name not in kept and time.time() - path.stat().st_mtime > _AGE:
+                path.unlink(missing_ok=True)  # to whoever still runs the older source it is missing, and is compiled
 
     def _load_index(self) -> Any:
         try:

@@ -71,10 +71,11 @@ def test_nowhere_to_keep_them__means_that_nothing_is_begun(begun: list[str], mon
     assert not begun
 
 
-def test_process_that_waits_for_another__says_so_and_compiles_nothing(
-    begun: list[str], monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("arguments", [["--once"], []])
+def test_process_that_waits_for_another__says_so(
+    arguments: list[str], begun: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The other one is done when it has been told twice that it is waited for."""
+    """The other one is done when it has been told twice that it is waited for; only who insists looks once more."""
     fcntl = pytest.importorskip("fcntl")
     note = warm._note()
     assert note is not None
@@ -85,14 +86,15 @@ def test_process_that_waits_for_another__says_so_and_compiles_nothing(
 
         def say(line: str) -> None:
             said.append(line)
+            assert not begun or len(said) > 2
             if len(said) == 2:
                 note.touch()
                 fcntl.flock(other, fcntl.LOCK_UN)
 
         monkeypatch.setattr(warm, "_say", say)
-        warm.ensure()
+        assert warm.main(arguments) == 0
     assert said[0].startswith("another process is compiling the numeric kernels") and said[1].startswith("  waiting, ")
-    assert not begun
+    assert begun == ([] if arguments else list(warm.PARTS))
 
 
 COMMANDS = (

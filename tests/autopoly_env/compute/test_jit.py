@@ -140,6 +140,24 @@ def test_cache__never_shows_the_code_of_an_older_source(tmp_path: Path, monkeypa
     assert found == [None, "new code"]
 
 
+def test_cache__sweeps_up_what_older_sources_of_a_function_have_left(tmp_path: Path) -> None:
+    def kept(age: float, name: str, source: bytes, *kinds: str) -> set[str]:
+        """The files that are there an hour (age 1) later, and after a function of this source was compiled."""
+        for path in tmp_path.iterdir():
+            os.utime(path, (path.stat().st_mtime - 3601 * age,) * 2)
+        for kind in kinds:
+            jit._CacheFile(str(tmp_path), name, source).save(kind, "code")
+        return {path.name for path in tmp_path.iterdir()}
+
+    old = kept(0, "one_kernels.cut-7.py311", b"old", "float", "int")
+    others = kept(0, "one_kernels.cut-7.py312", b"old", "float") | kept(0, "one_kernels.cut_all-7.py311", b"old", "int")
+    assert len(old) == 3 and len(others) == 3 + 4
+    assert kept(0, "one_kernels.cut-9.py311", b"new", "float") > others  # nobody knows yet whose the young ones are
+    there = kept(1, "one_kernels.cut-9.py311", b"new", "int")
+    assert not there & old and there > others - old
+    assert len(there - others) == 3  # the index, of float and of int
+
+
 def test_kernel__calls_no_python_on_its_way_out() -> None:
     """A signal's handler, as that of Ctrl-C, may raise in any Python; Numba would crash where that is its own."""
     square = np.array([0, 1, 2, 3]), np.array([0, 4]), 4
