@@ -4,6 +4,8 @@ SILHOUETTES ?=
 BIN := .venv/bin
 PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses=2
 INSTALL := $(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt
+# Something to read meanwhile; it ends with the recipe's shell, $$$$, however that does.
+TICKING := { s=0; while sleep 4 && kill -0 $$$$ 2>/dev/null; do s=$$((s + 4)); echo "  installing, $$s s"; done; } &
 
 .DEFAULT_GOAL := help
 .PHONY: help demo studio test quick lint format check bench extension clean
@@ -54,10 +56,10 @@ clean: ## remove what was generated; .venv stays
 
 .venv/installed-base: pyproject.toml constraints.txt | .venv/created
 	@echo "Installing AutoPoly into .venv ..."
-	@$(INSTALL) -e .
+	@$(TICKING) $(INSTALL) -e .; code=$$?; kill $$!; exit $$code
 	@touch $@
 
 .venv/installed-%: pyproject.toml constraints.txt | .venv/created
 	@echo "Installing AutoPoly with what '$*' needs into .venv ..."
-	@$(INSTALL) -e '.[$*]'
+	@$(TICKING) $(INSTALL) -e '.[$*]'; code=$$?; kill $$!; exit $$code
 	@touch $@

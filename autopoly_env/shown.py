@@ -34,6 +34,15 @@ def told(text: str, most: int = MOST_LETTERS) -> str:
     return f"{line[:n].rstrip()} ... {line[len(line) - (most - 5 - n) :].lstrip()}"
 
 
+def counted(count: int, noun: str) -> str:
+    """How many of something.
+
+    >>> counted(1, "hole"), counted(0, "hole"), counted(2, "process")
+    ('1 hole', '0 holes', '2 processes')
+    """
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}{'es' if noun.endswith('s') else 's'}"
+
+
 def short(value: Any, most: int = _SHORT) -> str:
     """A value as Python writes it, of at most `most` letters; what it holds is not gone through beyond that."""
     look = reprlib.Repr()

@@ -13,6 +13,7 @@ from agents.commands.pulse import Pulse
 from agents.commands.running import GOES_ON, run_command
 from autopoly_env.errors import ConfigError, RunError
 from autopoly_env.files import write_atomically
+from autopoly_env.shown import counted
 from training.networks.labelling import SourceConfig, build_trajectory
 from training.networks.trajectories import VERSION, Shard
 from training.options import plain, read_config
@@ -66,7 +67,7 @@ def make(
             n_failed += done.error is not None
     if n_failed:
         raise RunError(f"{n_failed} of {len(numbers)} shards failed; the same command tries them again")
-    print(f"{folder}: {len(list(folder.glob('*.npz')))} shards of {SHARD_SIZE} constructions")
+    print(f"{folder}: {counted(len(list(folder.glob('*.npz'))), 'shard')} of {SHARD_SIZE} constructions")
     return 0
 
 
@@ -74,9 +75,9 @@ def _banner(folder: Path, n: int, n_missing: int, n_shards: int, engine: str, wo
     """What is about to happen."""
     n_made = n_shards * SHARD_SIZE
     why = "" if n == n_made else f" (not {n}: a shard has {SHARD_SIZE}, always the same, so that runs can go on)"
-    hands = engine if engine == "serial" else f"{engine}, {workers or n_cores()} workers"
+    hands = engine if engine == "serial" else f"{engine}, {counted(workers or n_cores(), 'worker')}"
     known = f", {n_shards - n_missing} of them there already" if n_missing < n_shards else ""
-    return f"{folder}: {n_made} constructions{why} in {n_shards} shards{known}; {hands}"
+    return f"{folder}: {n_made} constructions{why} in {counted(n_shards, 'shard')}{known}; {hands}"
 
 
 def make_shard(source: SourceConfig, held_out: bool, folder: Path, number: int) -> int:

@@ -3,6 +3,7 @@
 import numpy as np
 
 from autopoly_env.arrays import BoolArray, IntArray
+from autopoly_env.shown import counted
 from autopoly_env.silhouette.background import border
 from autopoly_env.silhouette.connectivity import areas, grown, label_holes, label_parts, meets_in_corners, shrunk
 from autopoly_env.silhouette.options import ObjectOptions
@@ -87,11 +88,6 @@ def holes(mask: BoolArray) -> tuple[IntArray, IntArray]:
     enclosed[0] = False
     enclosed[border(labels)] = False
     return labels, np.flatnonzero(enclosed)
-
-
-def counted(count: int, noun: str) -> str:
-    """Such as "1 hole", "2 holes"."""
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def _word_on_dust(mask: BoolArray, least: int) -> str:

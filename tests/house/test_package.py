@@ -46,6 +46,12 @@ def test_every_verb__is_listed_by_help() -> None:
     assert phony.split() == re.findall(r"^([a-z]+):.*## ", makefile, re.MULTILINE)
 
 
+def test_make__says_something_while_it_installs() -> None:
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    installing = [line for line in makefile.splitlines() if "$(INSTALL)" in line]
+    assert len(installing) == 2 and all(line.startswith("\t@$(TICKING) ") for line in installing)
+
+
 def test_studio__comes_with_what_its_page_offers() -> None:
     """SVG in, DXF out; whoever opens it with `make studio` types no `pip install`."""
     extras = PROJECT["project"]["optional-dependencies"]

@@ -24,6 +24,7 @@ from autopoly_env.arguments import above, at_least
 from autopoly_env.arrays import ByteArray
 from autopoly_env.errors import ConfigError, RunError
 from autopoly_env.files import write_atomically
+from autopoly_env.shown import counted
 from training.networks.streams import Batch, batches
 from training.options import check_same_run, claim_run
 from training.run_log import RunLog
@@ -205,7 +206,7 @@ def _banner(
     due = run.eval_every - progress.step % run.eval_every
     return (
         f"{task.name} in {folder}: {n_weights:,} parameters on {process.device}, {optim.n_steps - progress.step} steps "
-        f"of {optim.batch_size * process.n_ranks} samples made by {max(1, run.n_workers)} processes\n"
+        f"of {optim.batch_size * process.n_ranks} samples made by {counted(max(1, run.n_workers), 'process')}\n"
         f"measured on held-out samples every {run.eval_every} steps, first in {min(due, optim.n_steps)}; it ends after "
         f"{run.patience} measurements in a row that are no better"
     )
