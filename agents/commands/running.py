@@ -14,7 +14,7 @@ from autopoly_env.shown import told
 FAILURE, USAGE_ERROR = 1, 2
 TOLD = -INTERRUPTED  # what a command returns that has told of its Ctrl-C itself
 STOPPED = "stopped by Ctrl-C"
-GOES_ON = "stopped by Ctrl-C; the same command goes on from here"
+GOES_ON = "stopped by Ctrl-C; the same command goes on from what was saved last"
 
 
 def run_command(app: typer.Typer, arguments: list[str] | None, name: str, *, stopped: str = STOPPED) -> int:
