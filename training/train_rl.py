@@ -83,7 +83,7 @@ def train_rl(config: TrainRlConfig, folder: Path, trust: bool = False) -> RunSta
 def _banner(config: TrainRlConfig, folder: Path, state: RunState, device: str) -> str:
     """What is about to happen."""
     run = config.run
-    limit = f", {run.minutes:g} minutes at most with all exams" if run.minutes else ""
+    limit = f", {run.minutes:g} min at most with all exams" if run.minutes else ""
     n_steps, asked = config.last_step(state.step) - state.step, run.total_steps - state.step
     whole = f" ({asked} rounded up to whole rollouts of {config.rollout})" if n_steps > asked else ""
     first = "before the first step, then " if run.init and not state.step else ""
