@@ -10,7 +10,7 @@ import shapely
 from autopoly_env.arguments import number
 from autopoly_env.arrays import FloatArray, IntArray
 from autopoly_env.errors import ConfigError
-from autopoly_env.mesh import PolyMesh, geometry_kernels
+from autopoly_env.mesh import PolyMesh
 from autopoly_env.raster import pixels_of, raster_kernels, workspace
 from autopoly_env.shown import short
 from autopoly_env.silhouette import Target
@@ -74,8 +74,8 @@ def self_intersections(mesh: PolyMesh) -> int:
 
     Exact: the pairs that floating-point rounding would decide are left to shapely's robust predicates.
     """
-    certain, uncertain = geometry_kernels.count_crossings(mesh.vertices, mesh.edges)
-    return int(certain) if uncertain == 0 else _robust_count(mesh.vertices[mesh.edges], mesh.edges)
+    found = mesh.defects
+    return _robust_count(mesh.vertices[mesh.edges], mesh.edges) if found.uncertain else found.crossings
 
 
 def _robust_count(ends: FloatArray, edges: IntArray) -> int:

@@ -127,7 +127,9 @@ class Simulator:
         size = resolution or self.resolution
         background = round(iou * _BACKGROUND_STEPS) / _BACKGROUND_STEPS
         if (size, background) not in self._refit_targets:
-            self._refit_targets[size, background] = RefitTarget.of(self.silhouette, size, background)
+            if (size, 1.0) not in self._refit_targets:
+                self._refit_targets[size, 1.0] = RefitTarget.of(self.silhouette, size)
+            self._refit_targets[size, background] = self._refit_targets[size, 1.0].with_background(background)
         return self._refit_targets[size, background]
 
     def settings(self) -> dict[str, Any]:

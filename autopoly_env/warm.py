@@ -199,7 +199,6 @@ def pictures() -> None:
     hairlines(mesh, target)
     tune(mesh, target)
     Details.of(silhouette)
-    RefitTarget.of(silhouette, 32, 0.5)
     Observer(4, 32, 1).observe(mesh, np.zeros((1, 32, 32), np.uint8), 1)
     coverage_vjp(batch_of([mesh]), np.ones((1, 32, 32)))
 
@@ -207,7 +206,7 @@ def pictures() -> None:
 def operators() -> None:
     """What operators ask of meshes, and the random constructions."""
     rectangle, silhouette = PolyMesh.rectangle(0.2, 0.2, 0.8, 0.7), _frame()
-    mended(rectangle, "quads")
+    mended(PolyMesh.from_faces([(0.2, 0.2), (0.8, 0.2), (0.3, 0.3), (0.2, 0.8)], [(0, 1, 2, 3)]), "quads")  # a dart
     for mesh in (rectangle, _ell()):
         for action in legal_actions(mesh, tuple(OPERATORS))[1:]:
             with contextlib.suppress(Exception):  # some have no room here

@@ -3,10 +3,10 @@
 import numpy as np
 
 from autopoly_env.arrays import FloatArray, IntArray
-from autopoly_env.compute import kernel
+from autopoly_env.compute import kernel, uncounted_kernel
 
 
-@kernel
+@uncounted_kernel
 def turn(points: FloatArray, before: int, at: int, after: int) -> float:
     """The sine of the angle by which a face turns at its corner `at`: above 0 where convex; 0 beside an empty edge."""
     ax, ay = points[at, 0] - points[before, 0], points[at, 1] - points[before, 1]
@@ -27,7 +27,7 @@ def turns(points: FloatArray, corners: IntArray, offsets: IntArray) -> FloatArra
     return sines
 
 
-@kernel
+@uncounted_kernel
 def keeps_turns(
     points: FloatArray, start: FloatArray, corners: IntArray, offsets: IntArray, asked: float
 ) -> bool:  # fmt: skip

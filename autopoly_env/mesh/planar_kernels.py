@@ -8,17 +8,17 @@ replay on another machine gives the same bits.
 import numpy as np
 
 from autopoly_env.arrays import BoolArray, FloatArray, IntArray
-from autopoly_env.compute import kernel
+from autopoly_env.compute import kernel, uncounted_kernel
 
 TOUCH = 1e-9  # segments nearer than this (unit square) count as touching
 
 
-@kernel
+@uncounted_kernel
 def cross(ox: float, oy: float, ax: float, ay: float, bx: float, by: float) -> float:
     return (ax - ox) * (by - oy) - (ay - oy) * (bx - ox)
 
 
-@kernel
+@uncounted_kernel
 def _point_near_segment(px: float, py: float, ax: float, ay: float, bx: float, by: float, gap: float) -> bool:
     dx, dy = bx - ax, by - ay
     length2 = dx * dx + dy * dy
@@ -29,12 +29,12 @@ def _point_near_segment(px: float, py: float, ax: float, ay: float, bx: float, b
     return bool(ex * ex + ey * ey <= gap * gap)
 
 
-@kernel
+@uncounted_kernel
 def point_on_segment(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> bool:
     return _point_near_segment(px, py, ax, ay, bx, by, TOUCH)
 
 
-@kernel
+@uncounted_kernel
 def segments_near(
     px: float, py: float, qx: float, qy: float, ax: float, ay: float, bx: float, by: float, gap: float
 ) -> bool:
@@ -55,13 +55,13 @@ def segments_near(
     )
 
 
-@kernel
+@uncounted_kernel
 def segments_touch(px: float, py: float, qx: float, qy: float, ax: float, ay: float, bx: float, by: float) -> bool:
     """Whether the closed segments pq and ab come within `TOUCH` of each other."""
     return segments_near(px, py, qx, qy, ax, ay, bx, by, TOUCH)
 
 
-@kernel
+@uncounted_kernel
 def enters_cone(ring: FloatArray, i: int, x: float, y: float, outside: bool) -> bool:
     """Whether the way from corner i of `ring` to (x, y) starts into its inside (outside), off its edges."""
     n = len(ring)
@@ -81,7 +81,7 @@ def enters_cone(ring: FloatArray, i: int, x: float, y: float, outside: bool) -> 
     return bool(left_of_after or right_of_before)
 
 
-@kernel
+@uncounted_kernel
 def misses_ring(ring: FloatArray, px: float, py: float, qx: float, qy: float, skip_i: int, skip_j: int) -> bool:
     """Whether segment pq touches no edge of `ring`, except those at corners skip_i and skip_j (-1: none)."""
     n = len(ring)
@@ -94,7 +94,7 @@ def misses_ring(ring: FloatArray, px: float, py: float, qx: float, qy: float, sk
     return True
 
 
-@kernel
+@uncounted_kernel
 def arc_area(ring: FloatArray, i: int, j: int) -> float:
     """Signed area of the polygon of corners i, i+1, ..., j (going round past the end if j < i)."""
     n, total, k = len(ring), 0.0, i
@@ -105,7 +105,7 @@ def arc_area(ring: FloatArray, i: int, j: int) -> float:
     return 0.5 * total
 
 
-@kernel
+@uncounted_kernel
 def is_free_diagonal(ring: FloatArray, face: IntArray, edges: IntArray, i: int, j: int) -> bool:
     """Whether corners i and j of a face are joined by a line strictly inside it that is no edge (E,2) of the mesh."""
     n = len(ring)
@@ -169,7 +169,7 @@ def split_imbalance(vertices: FloatArray, face: IntArray, edges: IntArray, i: in
     return imbalance
 
 
-@kernel
+@uncounted_kernel
 def _enters_trapezoid(
     ux: float, uy: float, vx: float, vy: float, width: float, height: float, inset: float, from_corner: bool
 ) -> bool:
@@ -196,7 +196,7 @@ def _enters_trapezoid(
     return high - low > 1e-9 if from_corner else high >= low
 
 
-@kernel
+@uncounted_kernel
 def _is_clear(vertices: FloatArray, edges: IntArray, a: int, b: int, offset: float, inset: float) -> bool:
     """Whether no other edge meets the trapezoid on edge a-b; its height and inset in lengths of the edge."""
     ax, ay = vertices[a, 0], vertices[a, 1]
@@ -215,7 +215,7 @@ def _is_clear(vertices: FloatArray, edges: IntArray, a: int, b: int, offset: flo
     return True
 
 
-@kernel
+@uncounted_kernel
 def clear_extrusion(
     vertices: FloatArray, edges: IntArray, a: int, b: int, offset: float, inset: float, n_halvings: int
 ) -> tuple[float, float]:

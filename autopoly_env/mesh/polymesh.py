@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +22,15 @@ from autopoly_env.mesh.drawing import Figure, drawing, groups
 from autopoly_env.mesh.topology import Face, Topology
 
 _NOTEBOOK_SIZE = 320  # user units a side of the drawing that notebooks show
+
+
+class Defects(NamedTuple):
+    """How often something is wrong with a valid mesh."""
+
+    crossings: int  # pairs of edges that cross
+    uncertain: int  # those of them that rounding decides
+    hairlines: int
+    flipped: int  # faces that are flipped or empty
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -105,13 +115,9 @@ class PolyMesh:
         return sum(self.counts)
 
     @cached_property
-    def defects(self) -> tuple[int, int, int]:
-        """How many pairs of edges cross, how many are hairlines, how many faces are flipped or empty: see `sanity`."""
-        topology = self.topology
-        crossings, hairlines, flipped = geometry_kernels.defects(
-            self.vertices, topology.edges, topology.is_boundary_edge, topology.corners, topology.face_offsets
-        )
-        return int(crossings), int(hairlines), int(flipped)
+    def defects(self) -> Defects:
+        """What is wrong with it all the same: see `sanity`."""
+        return Defects(*geometry_kernels.defects(self.vertices, self.topology.packed))
 
     def face_areas(self) -> FloatArray:
         """(F,) signed shoelace areas in the unit square; negative for a flipped face."""

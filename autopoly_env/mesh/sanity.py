@@ -10,8 +10,8 @@ def defects_of(mesh: PolyMesh, faces: FaceRule = "any") -> tuple[int, int]:
     A hairline is a pair of boundary edges that share no vertex and come closer than `CLEARANCE` without meeting: a
     corridor or a slit that shows in no picture, or two vertices as good as in one place.
     """
-    crossings, hairlines, flipped = mesh.defects
-    return crossings + hairlines, flipped + len(broken_faces(mesh, faces))
+    found = mesh.defects
+    return found.crossings + found.hairlines, found.flipped + len(broken_faces(mesh, faces))
 
 
 def is_sane(mesh: PolyMesh, faces: FaceRule = "any") -> bool:

@@ -14,8 +14,7 @@ import numpy as np
 
 from autopoly_env.arrays import BoolArray, IntArray
 from autopoly_env.errors import MeshError
-from autopoly_env.mesh import topology_kernels
-from autopoly_env.mesh.topology_kernels import Links
+from autopoly_env.mesh.topology_kernels import PAIRS, Links, packed_links
 
 MANY = 256  # corners of a mesh from which on single elements are looked up without tables of all
 
@@ -34,6 +33,28 @@ class HalfEdges(NamedTuple):
     offsets: list[int]  # (F+1,)
 
 
+_PLACES = {name: k for k, name in enumerate(Links._fields)}
+
+
+class _Parts:
+    """The parts of a packed topology by the names that `Links` has, each cut out when it is first asked for."""
+
+    def __init__(self, packed: IntArray) -> None:
+        self._packed = packed
+        self._begins = packed[: len(Links._fields) + 1].tolist()
+
+    def __getattr__(self, name: str) -> IntArray:
+        k = _PLACES.get(name, -1)
+        if k < 0:
+            raise AttributeError(f"a topology has no {name!r}; there is {', '.join(Links._fields)}")
+        begin, end = self._begins[k : k + 2]
+        part = self._packed[begin:end]
+        if name in PAIRS:
+            part = part.reshape(-1, 2)
+        self.__dict__[name] = part
+        return part
+
+
 @dataclass(frozen=True)
 class Topology:
     """The faces of a mesh as cycles of vertex indices, wound alike. Derived arrays are read-only."""
@@ -46,18 +67,20 @@ class Topology:
         return Topology, (self.n_vertices, self.faces)
 
     @cached_property
-    def arrays(self) -> Links:
-        """All of it as arrays, by one call of a kernel; the other properties follow from them. Not to be written to.
+    def packed(self) -> IntArray:
+        """All of it as one array, which kernels take apart (`topology_kernels.links_in`).
 
         Raises MeshError where a face has a vertex that there is not.
         """
-        is_sound, arrays = topology_kernels.links_of(self.corners, self.face_offsets, self.n_vertices)
-        if not is_sound:
+        packed: IntArray = packed_links(self.corners, self.face_offsets, self.n_vertices)
+        if not len(packed):
             raise MeshError(f"a face has a vertex beyond the {self.n_vertices} that there are; give indices from 0")
-        links = Links(*arrays)
-        for array in (links.half_edges, links.owners, links.edges, links.boundary):  # which others are given
-            _read_only(array)
-        return links
+        return _read_only(packed)
+
+    @cached_property
+    def arrays(self) -> _Parts:
+        """The parts of `packed` by the names of `Links`; the other properties follow from them."""
+        return _Parts(self.packed)
 
     @cached_property
     def links(self) -> HalfEdges:
@@ -130,7 +153,7 @@ class Topology:
         """(F+1,) the corners of face f are rows face_offsets[f]:face_offsets[f+1] of `half_edges`."""
         return _read_only(np.fromiter(accumulate(map(len, self.faces), initial=0), np.int64))
 
-    @property
+    @cached_property
     def edges(self) -> IntArray:
         """(E,2) vertex indices, ascending within a row and from row to row."""
         return self.arrays.edges
@@ -162,7 +185,7 @@ class Topology:
         loops = pairwise((0, *self.arrays.loop_ends.tolist()))
         return tuple(_read_only(tails[begin:end].copy()) for begin, end in loops)
 
-    @property
+    @cached_property
     def boundary_half_edges(self) -> IntArray:
         """(B,2) the directed edges of the boundary, loop by loop in the order of `boundary_loops`."""
         return self.arrays.boundary

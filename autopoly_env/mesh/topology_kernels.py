@@ -1,4 +1,7 @@
-"""A Numba kernel that says all that follows from which vertices make which faces.
+"""A Numba kernel that says all that follows from which vertices make which faces, in one packed array.
+
+Each array that a kernel hands back, or is given, costs more than the work on it: so kernels are given all of a topology
+as one, and find its parts themselves (`links_in`).
 
 Letters as in `topology`: V vertices, E edges, F faces, H half-edges (= corners), B boundary half-edges, L boundary
 loops, N boundary vertices, K others.
@@ -9,15 +12,14 @@ from typing import NamedTuple
 import numpy as np
 
 from autopoly_env.arrays import IntArray
-from autopoly_env.compute import kernel
+from autopoly_env.compute import inlined, kernel
 
 
 class Links(NamedTuple):
-    """The half-edges, the edges and the boundary as arrays, all int64; numbered as `Topology` says.
+    """The half-edges, the edges and the boundary as arrays, all int64; numbered as `Topology` says."""
 
-    What `links_of` gives, with names: a kernel that made them would call this class, and so Python, on its way out.
-    """
-
+    corners: IntArray  # (H,) the vertices of all faces, face by face
+    offsets: IntArray  # (F+1,) where each face begins in `corners`
     half_edges: IntArray  # (H, 2) from, to
     owners: IntArray  # (H,) the face of each
     following: IntArray  # (H,) the next around the same face
@@ -35,30 +37,71 @@ class Links(NamedTuple):
     neighbour_offsets: IntArray  # (K+1,)
 
 
-@kernel
-def links_of(corners: IntArray, offsets: IntArray, n_vertices: int) -> tuple[bool, tuple[IntArray, ...]]:
-    """The `Links` that follow from the faces' `corners` (H,), face f being offsets[f]:offsets[f+1].
+PAIRS = ("half_edges", "edges", "sides", "boundary", "loops")  # those with rows of two
+_N_PARTS = len(Links._fields)
 
-    False, and nothing of use, where there is no vertex of some number.
+
+@kernel
+def packed_links(corners: IntArray, offsets: IntArray, n_vertices: int) -> IntArray:
+    """What follows from the faces' `corners` (H,), face f being offsets[f]:offsets[f+1]: all of `Links` in one array.
+
+    It begins with where each part begins, and the last one ends. Empty where there is no vertex of some number.
     """
     n = len(corners)
     half_edges, owners, following = np.empty((n, 2), np.int64), np.empty(n, np.int64), np.empty(n, np.int64)
-    is_sound = True
     for f in range(len(offsets) - 1):
         for h in range(offsets[f], offsets[f + 1]):
+            if not 0 <= corners[h] < n_vertices:
+                return np.empty(0, np.int64)
             owners[h] = f
             following[h] = h + 1 if h + 1 < offsets[f + 1] else offsets[f]
-            half_edges[h, 0], half_edges[h, 1] = corners[h], corners[following[h]]
-            is_sound &= 0 <= corners[h] < n_vertices
-    if not is_sound:
-        n, n_vertices = 0, 0
-    order = _by_edge(half_edges[:n], n_vertices)
-    twins, edges, sides, edge_of = _paired(half_edges[:n], order)
+            half_edges[h, 0] = corners[h]
+            half_edges[h, 1] = corners[following[h]]
+    order = _by_edge(half_edges, n_vertices)
+    twins, edges, sides, edge_of = _paired(half_edges, order)
     rim, loop_ends = _rim(following, twins)
     outer, boundary, loops, row_of = _outline(half_edges, rim, n_vertices)
     inner, neighbours, neighbour_offsets = _inside(edges, row_of, len(outer))
-    first = half_edges, owners, following, twins, edges, sides, edge_of, rim, boundary, loop_ends
-    return is_sound, first + (outer, loops, inner, neighbours, neighbour_offsets)
+    parts = (
+        corners.copy(), offsets.copy(), half_edges.reshape(-1), owners, following, twins, edges.reshape(-1),
+        sides.reshape(-1), edge_of, rim, boundary.reshape(-1), loop_ends, outer, loops.reshape(-1), inner, neighbours,
+        neighbour_offsets,
+    )  # fmt: skip
+    end = _N_PARTS + 1
+    for part in parts:
+        end += len(part)
+    packed = np.empty(end, np.int64)
+    end = _N_PARTS + 1
+    for k, part in enumerate(parts):
+        packed[k] = end
+        for value in part:
+            packed[end] = value
+            end += 1
+    packed[_N_PARTS] = end
+    return packed
+
+
+@inlined
+def links_in(packed: IntArray) -> Links:
+    """The parts of a packed topology, which share its memory."""
+    return Links(
+        part_of(packed, 0), part_of(packed, 1), pairs_of(packed, 2), part_of(packed, 3), part_of(packed, 4),
+        part_of(packed, 5), pairs_of(packed, 6), pairs_of(packed, 7), part_of(packed, 8), part_of(packed, 9),
+        pairs_of(packed, 10), part_of(packed, 11), part_of(packed, 12), pairs_of(packed, 13), part_of(packed, 14),
+        part_of(packed, 15), part_of(packed, 16),
+    )  # fmt: skip
+
+
+@inlined
+def part_of(packed: IntArray, k: int) -> IntArray:
+    """Part k of an array that begins with where each of its parts begins, and the last one ends."""
+    return packed[packed[k] : packed[k + 1]]
+
+
+@inlined
+def pairs_of(packed: IntArray, k: int) -> IntArray:
+    """The same in rows of two."""
+    return packed[packed[k] : packed[k + 1]].reshape((-1, 2))
 
 
 @kernel

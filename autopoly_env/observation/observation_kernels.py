@@ -6,11 +6,11 @@ Letters: R pixels a side, V vertices, B directed boundary edges, E edges, H corn
 import numpy as np
 
 from autopoly_env.arrays import ByteArray, Float32Array, FloatArray, Int32Array, IntArray
-from autopoly_env.compute import kernel
+from autopoly_env.compute import uncounted_kernel
 from autopoly_env.raster.raster_kernels import Workspace, coverage_image
 
 
-@kernel
+@uncounted_kernel
 def observe(
     points: FloatArray,
     boundary: IntArray,

@@ -6,7 +6,7 @@ Letters: R pixels a side, L regions of connected disagreement, V vertices, B dir
 import numpy as np
 
 from autopoly_env.arrays import FloatArray, IntArray
-from autopoly_env.compute import kernel
+from autopoly_env.compute import kernel, uncounted_kernel
 
 MASS, FAR_X, FAR_Y, LOW, HIGH, DEPTH = range(6)
 AREA, DEEP_X, DEEP_Y, RADIUS, MEAN_X, MEAN_Y, VAR_X, VAR_Y, COV_XY = range(9)
@@ -85,7 +85,7 @@ def blame_edges(
     return blame
 
 
-@kernel
+@uncounted_kernel
 def _nearest_edge(points: FloatArray, edges: IntArray, x: float, y: float) -> tuple[int, float, float]:
     """The boundary edge nearest to (x, y), the foot of the perpendicular along it (0 to 1), and the distance."""
     nearest, least, foot = 0, np.inf, 0.0

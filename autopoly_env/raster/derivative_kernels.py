@@ -13,7 +13,7 @@ import numpy as np
 from numba.cpython.unsafe.numbers import trailing_zeros
 
 from autopoly_env.arrays import FloatArray, IntArray
-from autopoly_env.compute import kernel
+from autopoly_env.compute import uncounted_kernel
 from autopoly_env.raster.raster_kernels import (
     AREA,
     COVER,
@@ -33,7 +33,7 @@ from autopoly_env.raster.raster_kernels import (
 AT_START, AT_END, START_START, START_END, END_END = 0, 1, 2, 3, 4  # of `Workspace.sums`
 
 
-@kernel
+@uncounted_kernel
 def half_gradient(
     points: FloatArray, edges: IntArray, picture: Picture, work: Workspace, gradient: FloatArray
 ) -> float:  # fmt: skip
@@ -44,7 +44,7 @@ def half_gradient(
     return loss
 
 
-@kernel
+@uncounted_kernel
 def _sum_residuals(points: FloatArray, edges: IntArray, picture: Picture, work: Workspace, squares: bool) -> float:
     """Return the loss; leave what derivatives need in `work.sums`, with `squares` what J'J needs, too."""
     size = picture.coverage.shape[0]
@@ -76,7 +76,7 @@ def _sum_residuals(points: FloatArray, edges: IntArray, picture: Picture, work: 
     return loss if not loss < 0.0 else 0.0  # differences of prefix sums may round to less than nothing
 
 
-@kernel
+@uncounted_kernel
 def _weighed(residual: float, row: int, column: int, weight_sum: FloatArray) -> float:
     """The residual of a pixel times its weight."""
     if weight_sum.shape[0] == 0:
@@ -84,7 +84,7 @@ def _weighed(residual: float, row: int, column: int, weight_sum: FloatArray) -> 
     return residual * (weight_sum[row, column + 1] - weight_sum[row, column])
 
 
-@kernel
+@uncounted_kernel
 def _span_loss(total: float, row: int, first: int, last: int, picture: Picture) -> float:
     """Squared error of the untouched pixels first..last-1 of a row, which the mesh covers `total` times."""
     return (
@@ -94,7 +94,7 @@ def _span_loss(total: float, row: int, first: int, last: int, picture: Picture) 
     )
 
 
-@kernel
+@uncounted_kernel
 def _pull(cell: int, residual: float, work: Workspace) -> None:
     """Add residual * integrals of (1 - t) and t of one cell's pieces to the sums of their edges."""
     piece = int(work.cells[cell, HEAD]) - 1
@@ -105,7 +105,7 @@ def _pull(cell: int, residual: float, work: Workspace) -> None:
         piece = int(work.pieces[piece, NEXT]) - 1
 
 
-@kernel
+@uncounted_kernel
 def _empty_sums(points: FloatArray, edges: IntArray, size: int, work: Workspace, gradient: FloatArray) -> None:
     """Add what `_pull` summed up to `gradient` (V, 2), per pixel, and leave the sums at zero."""
     for edge in range(edges.shape[0]):
@@ -120,7 +120,7 @@ def _empty_sums(points: FloatArray, edges: IntArray, size: int, work: Workspace,
         work.sums[edge, AT_START] = work.sums[edge, AT_END] = 0.0
 
 
-@kernel
+@uncounted_kernel
 def loss_and_gradient(
     points: FloatArray, edges: IntArray, picture: Picture, work: Workspace, gradient: FloatArray
 ) -> float:  # fmt: skip
@@ -133,7 +133,7 @@ def loss_and_gradient(
     return loss
 
 
-@kernel
+@uncounted_kernel
 def normal_equations(
     points: FloatArray, edges: IntArray, picture: Picture, work: Workspace, gradient: FloatArray, normal: FloatArray
 ) -> float:
@@ -150,7 +150,7 @@ def normal_equations(
     return loss
 
 
-@kernel
+@uncounted_kernel
 def _sum_squares(cell: int, weight: float, work: Workspace) -> None:
     """Add the products of each piece's two integrals to the sums of its edge."""
     piece = int(work.cells[cell, HEAD]) - 1
@@ -163,7 +163,7 @@ def _sum_squares(cell: int, weight: float, work: Workspace) -> None:
         piece = int(work.pieces[piece, NEXT]) - 1
 
 
-@kernel
+@uncounted_kernel
 def _empty_squares(points: FloatArray, edges: IntArray, size: int, work: Workspace, normal: FloatArray) -> None:
     """Add what `_sum_squares` summed up to the lower triangle of J'WJ (2V, 2V), and leave the sums at zero."""
     for edge in range(edges.shape[0]):
@@ -182,7 +182,7 @@ def _empty_squares(points: FloatArray, edges: IntArray, size: int, work: Workspa
         work.sums[edge, START_START] = work.sums[edge, START_END] = work.sums[edge, END_END] = 0.0
 
 
-@kernel
+@uncounted_kernel
 def vector_jacobian(
     points: FloatArray, edges: IntArray, size: int, cotangent: FloatArray, work: Workspace, gradient: FloatArray
 ) -> None:
@@ -203,7 +203,7 @@ def vector_jacobian(
     _empty_sums(points, edges, size, work, gradient)
 
 
-@kernel
+@uncounted_kernel
 def losses_and_gradients(
     points: FloatArray, edges: IntArray, point_starts: IntArray, edge_starts: IntArray, first: int, last: int,
     picture: Picture, work: Workspace, losses: FloatArray, gradients: FloatArray,
@@ -219,7 +219,7 @@ def losses_and_gradients(
         )
 
 
-@kernel
+@uncounted_kernel
 def vector_jacobians(
     points: FloatArray, edges: IntArray, point_starts: IntArray, edge_starts: IntArray, first: int, last: int,
     cotangents: FloatArray, work: Workspace, gradients: FloatArray,

@@ -18,7 +18,7 @@ import numpy as np
 from numba.cpython.unsafe.numbers import trailing_zeros
 
 from autopoly_env.arrays import BoolArray, FloatArray, IntArray, UIntArray
-from autopoly_env.compute import kernel
+from autopoly_env.compute import uncounted_kernel
 
 
 class Workspace(NamedTuple):
@@ -61,7 +61,7 @@ EDGE, START, END, NEXT = 0, 1, 2, 3
 PADDING = 8
 
 
-@kernel
+@uncounted_kernel
 def _add_piece(n: int, edge: int, cell: int, t0: float, t1: float, work: Workspace) -> int:
     end = 0.5 * (t1 * t1 - t0 * t0)
     work.pieces[n, EDGE] = edge
@@ -72,19 +72,19 @@ def _add_piece(n: int, edge: int, cell: int, t0: float, t1: float, work: Workspa
     return n + 1
 
 
-@kernel
+@uncounted_kernel
 def clear(cell: int, work: Workspace) -> None:
     work.cells[cell, AREA] = 0.0
     work.cells[cell, COVER] = 0.0
     work.cells[cell, HEAD] = 0.0
 
 
-@kernel
+@uncounted_kernel
 def _touch(row: int, column: int, words: int, work: Workspace) -> None:
     work.touched[row * words + (column >> 6)] |= np.uint64(1) << np.uint64(column & 63)
 
 
-@kernel
+@uncounted_kernel
 def _walk_left_of_image(
     y0: float, y1: float, size: int, words: int, work: Workspace, first_row: int, last_row: int
 ) -> None:
@@ -99,7 +99,7 @@ def _walk_left_of_image(
         _touch(row, 0, words, work)
 
 
-@kernel
+@uncounted_kernel
 def _walk_inside(
     x0: float, y0: float, dx: float, dy: float, t: float, t_stop: float,
     edge: int, size: int, words: int, n: int, work: Workspace, first_row: int, last_row: int,
@@ -144,13 +144,13 @@ def _walk_inside(
             next_y = (row + (dy > 0) - y0) * per_y
 
 
-@kernel
+@uncounted_kernel
 def _crossing(row: int, y0: float, dy: float, size: int) -> float:
     """Where along an edge the top of a row is: just where `_walk_inside` cuts it, but at the image's borders."""
     return (row - y0) / dy if row == 0 or row == size else (row - y0) * (1.0 / dy)
 
 
-@kernel
+@uncounted_kernel
 def walk_boundary(
     points: FloatArray, edges: IntArray, size: int, work: Workspace, first_row: int, last_row: int
 ) -> None:
@@ -192,7 +192,7 @@ def walk_boundary(
             _walk_left_of_image(y0 + tb * dy, y0 + t1 * dy, size, words, work, first_row, last_row)
 
 
-@kernel
+@uncounted_kernel
 def coverage_image(points: FloatArray, edges: IntArray, size: int, work: Workspace, image: FloatArray) -> None:
     """Write the (R, R) coverage, unclamped (2 where faces overlap), into `image`."""
     walk_boundary(points, edges, size, work, 0, size)
@@ -215,7 +215,7 @@ def coverage_image(points: FloatArray, edges: IntArray, size: int, work: Workspa
         image[row, column:size] = total
 
 
-@kernel
+@uncounted_kernel
 def span_weight(row: int, first: int, last: int, weight_sum: FloatArray) -> float:
     """What the pixels first..last-1 of a row weigh together: each 1, or as `weight_sum` (R, R+1) along rows says."""
     if weight_sum.shape[0] == 0:
@@ -223,7 +223,7 @@ def span_weight(row: int, first: int, last: int, weight_sum: FloatArray) -> floa
     return weight_sum[row, last] - weight_sum[row, first]
 
 
-@kernel
+@uncounted_kernel
 def _share(covered: float, by_area: bool) -> float:
     """What a pixel with this coverage counts."""
     if by_area:
@@ -231,7 +231,7 @@ def _share(covered: float, by_area: bool) -> float:
     return 1.0 if covered >= 0.5 else 0.0
 
 
-@kernel
+@uncounted_kernel
 def overlap_counts(points: FloatArray, edges: IntArray, pixels: Pixels, work: Workspace) -> tuple[float, float]:
     """Pixels with coverage >= 0.5: (those inside the target mask, all of them); weighed where pixels have weights.
 
@@ -240,7 +240,7 @@ def overlap_counts(points: FloatArray, edges: IntArray, pixels: Pixels, work: Wo
     return overlap_counts_in_rows(points, edges, pixels, work, 0, pixels.mask.shape[0])
 
 
-@kernel
+@uncounted_kernel
 def overlap_counts_in_rows(
     points: FloatArray, edges: IntArray, pixels: Pixels, work: Workspace, first_row: int, last_row: int
 ) -> tuple[float, float]:
@@ -280,7 +280,7 @@ def overlap_counts_in_rows(
     return inside, filled
 
 
-@kernel
+@uncounted_kernel
 def coverage_images(
     points: FloatArray, edges: IntArray, point_starts: IntArray, edge_starts: IntArray, first: int, last: int,
     size: int, work: Workspace, images: FloatArray,

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from autopoly_env.arrays import FloatArray, IntArray
-from autopoly_env.compute import kernel
+from autopoly_env.compute import uncounted_kernel
 
 
 class Factor(NamedTuple):
@@ -15,7 +15,7 @@ class Factor(NamedTuple):
     first: IntArray  # (N,) column of the first entry of each row that is not 0
 
 
-@kernel
+@uncounted_kernel
 def _dot(one: FloatArray, i: int, other: FloatArray, j: int, first: int, last: int) -> float:
     """Of row i of one and row j of another, columns first..last-1; four sums, which a processor adds side by side."""
     a, b, c, d = 0.0, 0.0, 0.0, 0.0
@@ -32,7 +32,7 @@ def _dot(one: FloatArray, i: int, other: FloatArray, j: int, first: int, last: i
     return (a + b) + (c + d)
 
 
-@kernel
+@uncounted_kernel
 def factorise(factor: Factor, relative: float, absolute: float) -> bool:
     """Put L in the place of A + relative * diag(A) + absolute * 1; False if that is not positive definite."""
     matrix, first = factor
@@ -52,13 +52,23 @@ def factorise(factor: Factor, relative: float, absolute: float) -> bool:
     return True
 
 
-@kernel
+@uncounted_kernel
 def solve(factor: Factor, vector: FloatArray) -> None:
     """Put the solution x of A x = `vector` (N,) in its place."""
     matrix, first = factor
-    row = vector.reshape(1, -1)
     for i in range(vector.shape[0]):
-        vector[i] = (vector[i] - _dot(matrix, i, row, 0, first[i], i)) / matrix[i, i]
+        a, b, c, d = 0.0, 0.0, 0.0, 0.0  # as in `_dot`
+        k = first[i]
+        while k + 4 <= i:
+            a += matrix[i, k] * vector[k]
+            b += matrix[i, k + 1] * vector[k + 1]
+            c += matrix[i, k + 2] * vector[k + 2]
+            d += matrix[i, k + 3] * vector[k + 3]
+            k += 4
+        while k < i:
+            a += matrix[i, k] * vector[k]
+            k += 1
+        vector[i] = (vector[i] - ((a + b) + (c + d))) / matrix[i, i]
     for i in range(vector.shape[0] - 1, -1, -1):
         vector[i] /= matrix[i, i]
         for k in range(first[i], i):

@@ -3,8 +3,8 @@
 import numpy as np
 
 from autopoly_env.mesh import ASKED_TURN, FaceRule, PolyMesh, broken_faces, fits_rule
-from autopoly_env.refit.refitting import Bonds, shape_for
-from autopoly_env.refit.rule_kernels import hold
+from autopoly_env.refit.refitting import Bonds, shape_arguments
+from autopoly_env.refit.shape_kernels import hold_vertices
 
 _ROUNDS = 8
 
@@ -18,12 +18,10 @@ def mended(mesh: PolyMesh, faces: FaceRule, bonds: Bonds | None = None) -> PolyM
         return None
     if not broken_faces(mesh, faces, ASKED_TURN):
         return mesh
-    shape = shape_for(mesh.topology, faces, bonds)
-    points, unknowns = mesh.vertices.copy(), mesh.vertices[shape.boundary]
+    points, shape = mesh.vertices.copy(), shape_arguments(mesh.topology, faces, bonds)
     low, high = min(0.0, float(points.min())), max(1.0, float(points.max()))
     for _ in range(_ROUNDS):
-        hold(shape.rule, unknowns, low, high)
-        points[shape.boundary] = unknowns
+        hold_vertices(points, *shape, low, high)
         made = mesh.with_vertices(points)
         if not broken_faces(made, faces, ASKED_TURN):
             return made if low <= points.min() and points.max() <= high and np.isfinite(points).all() else None

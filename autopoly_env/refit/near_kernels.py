@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from autopoly_env.arrays import FloatArray
-from autopoly_env.compute import kernel
+from autopoly_env.compute import kernel, uncounted_kernel
 from autopoly_env.raster.derivative_kernels import half_gradient, normal_equations
 from autopoly_env.raster.raster_kernels import Picture, Workspace
 from autopoly_env.refit.cholesky_kernels import Factor, factorise, solve
@@ -51,6 +51,7 @@ class _Memory(NamedTuple):
     changes: FloatArray  # (K, 2N) of half the gradient
     products: FloatArray  # (K,) of the two
     shares: FloatArray  # (K,) scratch
+    solved: FloatArray  # (2N,) scratch
 
 
 @kernel
@@ -67,7 +68,10 @@ def near_phase(
     size = picture.coverage.shape[0]
     gradient, next_gradient, candidate = np.empty((n, 2)), np.empty((n, 2)), np.empty((n, 2))
     factor, move = Factor(np.empty((2 * n, 2 * n)), np.empty(2 * n, np.int64)), np.empty(2 * n)
-    memory = _Memory(np.empty((_N_KEPT, 2 * n)), np.empty((_N_KEPT, 2 * n)), np.empty(_N_KEPT), np.empty(_N_KEPT))
+    memory = _Memory(
+        *(np.empty((_N_KEPT, 2 * n)), np.empty((_N_KEPT, 2 * n))),
+        *(np.empty(_N_KEPT), np.empty(_N_KEPT), np.empty(2 * n)),
+    )
     origin = unknowns.copy()
     damping, n_kept, stretch = _RELATIVE_DAMPING, 0, 1.0
     loss = damped_equations(origin, unknowns, shape, picture, stiffness, work, gradient, factor.matrix)
@@ -118,7 +122,7 @@ def near_phase(
     return loss
 
 
-@kernel
+@uncounted_kernel
 def _direction(
     gradient: FloatArray, factor: Factor, memory: _Memory, n_kept: int, stretch: float, move: FloatArray
 ) -> tuple[float, float]:
@@ -155,7 +159,7 @@ def _direction(
     return max(np.sqrt(longest), 1e-12), foreseen
 
 
-@kernel
+@uncounted_kernel
 def _stride(
     unknowns: FloatArray, length: float, move: FloatArray, shape: Shape, best: Progress, candidate: FloatArray
 ) -> None:
@@ -164,11 +168,12 @@ def _stride(
     for v in range(unknowns.shape[0]):
         candidate[v, 0] = min(max(unknowns[v, 0] + length * move[2 * v], low), high)
         candidate[v, 1] = min(max(unknowns[v, 1] + length * move[2 * v + 1], low), high)
-    hold(shape.rule, candidate, low, high)
+    if shape.rule.triples.shape[0] > 0:
+        hold(shape.rule, candidate, low, high)
     obey(shape.ties, shape.boundary, best, candidate)
 
 
-@kernel
+@uncounted_kernel
 def _shorter(unknowns: FloatArray, candidate: FloatArray, gradient: FloatArray, size: int, rise: float) -> float:
     """By what a step that made the loss `rise` is to be shortened: to the lowest point of a parabola, or to a half."""
     slope = 0.0
@@ -179,7 +184,7 @@ def _shorter(unknowns: FloatArray, candidate: FloatArray, gradient: FloatArray, 
     return min(max(-0.5 * slope / bend, 0.1), 0.5) if bend > 0.0 else 0.25
 
 
-@kernel
+@uncounted_kernel
 def _remember(
     unknowns: FloatArray, candidate: FloatArray, gradient: FloatArray, next_gradient: FloatArray, size: int,
     factor: Factor, memory: _Memory, n_kept: int, stretch: float,
@@ -188,8 +193,9 @@ def _remember(
     n = memory.moves.shape[1]
     if n_kept == _N_KEPT:
         for i in range(_N_KEPT - 1):
-            memory.moves[i] = memory.moves[i + 1]
-            memory.changes[i] = memory.changes[i + 1]
+            for k in range(n):
+                memory.moves[i, k] = memory.moves[i + 1, k]
+                memory.changes[i, k] = memory.changes[i + 1, k]
             memory.products[i] = memory.products[i + 1]
         n_kept -= 1
     product, square = 0.0, 0.0
@@ -202,15 +208,16 @@ def _remember(
     if not product > _LEAST_CURVATURE * square:
         return n_kept, stretch
     memory.products[n_kept] = product
-    solved = memory.changes[n_kept].copy()
-    solve(factor, solved)
+    for k in range(n):
+        memory.solved[k] = memory.changes[n_kept, k]
+    solve(factor, memory.solved)
     square = 0.0
     for k in range(n):
-        square += solved[k] * memory.changes[n_kept, k]
+        square += memory.solved[k] * memory.changes[n_kept, k]
     return n_kept + 1, min(max(product / square, 1.0), _MOST_STRETCH)
 
 
-@kernel
+@uncounted_kernel
 def damped_gradient(
     origin: FloatArray, unknowns: FloatArray, shape: Shape, picture: Picture, stiffness: float, work: Workspace,
     gradient: FloatArray,
@@ -219,12 +226,13 @@ def damped_gradient(
     size = picture.coverage.shape[0]
     loss = half_gradient(unknowns, shape.loops, picture, work, gradient)
     loss += _stretching(origin, unknowns, shape, stiffness, size, gradient)
-    loss += hinge(shape.rule, origin, unknowns, size, gradient, np.empty((0, 0)))
+    if shape.rule.triples.shape[0] > 0:
+        loss += hinge(shape.rule, origin, unknowns, size, gradient, gradient[:0])
     tie_gradient(shape.ties, gradient)
     return loss
 
 
-@kernel
+@uncounted_kernel
 def damped_equations(
     origin: FloatArray, unknowns: FloatArray, shape: Shape, picture: Picture, stiffness: float, work: Workspace,
     gradient: FloatArray, normal: FloatArray,
@@ -241,13 +249,14 @@ def damped_equations(
             normal[2 * i + axis, 2 * i + axis] += stiffness
             normal[2 * j + axis, 2 * j + axis] += stiffness
             normal[2 * max(i, j) + axis, 2 * min(i, j) + axis] -= stiffness
-    loss += hinge(shape.rule, origin, unknowns, size, gradient, normal)
+    if shape.rule.triples.shape[0] > 0:
+        loss += hinge(shape.rule, origin, unknowns, size, gradient, normal)
     tie_gradient(shape.ties, gradient)
     tie_normal(shape.ties, normal)
     return loss
 
 
-@kernel
+@uncounted_kernel
 def _stretching(
     origin: FloatArray, unknowns: FloatArray, shape: Shape, stiffness: float, size: int, gradient: FloatArray
 ) -> float:

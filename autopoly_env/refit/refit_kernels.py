@@ -5,12 +5,13 @@ Letters: see `shape_kernels`.
 
 import numpy as np
 
-from autopoly_env.arrays import FloatArray
+from autopoly_env.arrays import FloatArray, IntArray
 from autopoly_env.compute import kernel
-from autopoly_env.mesh.geometry_kernels import defects
+from autopoly_env.mesh.geometry_kernels import count_defects
 from autopoly_env.raster.raster_kernels import Picture, Workspace
 from autopoly_env.refit.far_kernels import far_phase
 from autopoly_env.refit.near_kernels import near_phase
+from autopoly_env.refit.pyramid_kernels import picture_in
 from autopoly_env.refit.shape_kernels import (
     HIGH,
     LOSS,
@@ -27,20 +28,34 @@ from autopoly_env.refit.shape_kernels import (
     offer,
     put,
     rebase,
+    shape_of,
     take_boundary,
 )
 
 
 @kernel
 def refit(
-    start: FloatArray, shape: Shape, pyramid: tuple[Picture, ...], settings: Settings, work: Workspace,
-    result: FloatArray,
+    start: FloatArray, packed: IntArray, bound: IntArray, axis: float, asked: float,
+    coverages: FloatArray, sums: FloatArray,
+    first_level: int, n_near: int, n_far: int, stiffness: float, damping: float, tolerance: float, keep_defects: bool,
+    work: Workspace, result: FloatArray,
 ) -> tuple[float, float, int]:  # fmt: skip
     """Fit all vertices to the target; write (V, 2) `result`; return (loss before, loss after, evaluations).
 
-    The loss is the sum of squared coverage errors at the last, finest picture of `pyramid`. The result has no larger
-    loss than the start, and no more crossings, hairlines or flipped faces unless `settings.keep_defects` is true.
+    The arguments are those of `shape_of`, those of `picture_in`, and those of `Settings`, which numbers cross into a
+    kernel sooner than tuples. The loss is the sum of squared coverage errors at the finest level. The result has no
+    larger loss than the start, and no more crossings, hairlines or flipped faces unless `keep_defects` is true. A start
+    that is not finite has no loss: NaN, and nothing is written.
     """
+    for v in range(start.shape[0]):
+        if not (np.isfinite(start[v, 0]) and np.isfinite(start[v, 1])):
+            return np.nan, np.nan, 0
+    shape = shape_of(packed, bound, axis, asked)
+    pyramid = (
+        picture_in(coverages, sums, 0), picture_in(coverages, sums, 1), picture_in(coverages, sums, 2),
+        picture_in(coverages, sums, 3),
+    )  # fmt: skip
+    settings = Settings(first_level, n_near, n_far, stiffness, damping, tolerance, keep_defects)
     n = shape.boundary.shape[0]
     unknowns, scratch = np.empty((n, 2)), np.empty((n, 2))
     low, high = 0.0, 1.0
@@ -50,8 +65,11 @@ def refit(
             unknowns[k, axis] = start[v, axis]
             low, high = min(low, start[v, axis]), max(high, start[v, axis])
     fine = pyramid[len(pyramid) - 1]
-    best = Progress(start.copy(), start.copy(), np.empty((start.shape[0], 2)), np.zeros(7))
-    crossings, hairlines, flipped = defects(best.start, shape.edges, shape.on_rim, shape.corners, shape.offsets)
+    boxes = np.empty((shape.edges.shape[0], 4))
+    best = Progress(start.copy(), start.copy(), np.empty((start.shape[0], 2)), boxes, np.zeros(7))
+    crossings, _, hairlines, flipped = count_defects(
+        best.start, shape.edges, shape.sides, shape.corners, shape.offsets, boxes
+    )
     best.record[MOST_CROSSINGS] = 1e9 if settings.keep_defects else crossings
     best.record[MOST_HAIRLINES] = 1e9 if settings.keep_defects else hairlines
     best.record[MOST_FLIPPED] = 1e9 if settings.keep_defects else flipped

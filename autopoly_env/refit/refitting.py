@@ -15,20 +15,26 @@ Letters: V vertices, R pixels a side. The loss is the sum over pixels of (covera
 each pixel times its weight where the target has weights.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
-from autopoly_env.arrays import BoolArray, IntArray
+from autopoly_env.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from autopoly_env.errors import MeshError
 from autopoly_env.mesh import ASKED_TURN, FaceRule, PolyMesh, Topology
-from autopoly_env.raster import picture_of, workspace
+from autopoly_env.raster import workspace
 from autopoly_env.raster.raster_kernels import Picture
 from autopoly_env.refit import refit_kernels
-from autopoly_env.refit.rule_kernels import FREE, LOCKED, NO_RULE, Rule
-from autopoly_env.refit.shape_kernels import Settings, Shape, Ties
-from autopoly_env.silhouette import Silhouette, Target, sums_with_background
+from autopoly_env.refit.pyramid_kernels import N_LEVELS, packed_sums, picture_in
+from autopoly_env.refit.rule_kernels import FREE, LOCKED
+from autopoly_env.refit.shape_kernels import Settings
+from autopoly_env.silhouette import WEIGHT_STEPS, Silhouette, Target
+
+_NOTHING = np.empty(0, np.int64)
+_NOTHING.setflags(write=False)
 
 
 @dataclass(frozen=True)
@@ -63,11 +69,14 @@ THOROUGH = RefitConfig(first_level=1, n_far=20)  # the start is roughly right
 LOCAL = RefitConfig(first_level=2)  # the start nearly fits
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RefitTarget:
-    """The pyramid that a refit climbs."""
+    """The pyramid that a refit climbs, its four levels one after the other, coarse to fine, in each array."""
 
-    pictures: tuple[Picture, Picture, Picture, Picture]
+    sizes: IntArray  # (4,) R of each level
+    coverages: FloatArray  # the levels' (R, R)
+    weights: FloatArray  # the same of the pixels' weights, or empty
+    sums: FloatArray  # what `pyramid_kernels.packed_sums` makes of these
 
     @classmethod
     def of(cls, silhouette: Silhouette, resolution: int, background: float = 1.0) -> "RefitTarget":
@@ -75,14 +84,38 @@ class RefitTarget:
 
         `background` is what a pixel outside the silhouette weighs beside one inside.
         """
-        sizes = [max(min(8, resolution), resolution // divisor) for divisor in (8, 4, 2, 1)]
-        pictures = [_picture(silhouette.target(size), background) for size in sizes]
-        return cls((pictures[0], pictures[1], pictures[2], pictures[3]))
+        levels = [max(min(8, resolution), resolution // divisor) for divisor in (8, 4, 2, 1)]
+        return cls.of_levels(silhouette.pyramid(levels), background)
+
+    @classmethod
+    def of_levels(cls, levels: Sequence[Target], background: float = 1.0) -> "RefitTarget":
+        """Four targets, coarse to fine."""
+        weights = [level.weights.ravel() for level in levels if level.weights is not None]
+        return _weighing(
+            _read_only(np.array([level.resolution for level in levels])),
+            _read_only(np.concatenate([level.coverage.ravel() for level in levels])),
+            _read_only(np.concatenate([*weights, np.empty(0)])),
+            background,
+        )
+
+    def with_background(self, background: float) -> "RefitTarget":
+        """The same levels, whose pixels outside the silhouette weigh `background`."""
+        return _weighing(self.sizes, self.coverages, self.weights, background)
 
     @property
+    def pictures(self) -> tuple[Picture, ...]:
+        """The four levels apart."""
+        return tuple(picture_in(self.coverages, self.sums, level) for level in range(N_LEVELS))
+
+    @cached_property
     def resolution(self) -> int:
         """R of the finest level."""
-        return len(self.pictures[-1].coverage)
+        return int(self.sizes[-1])
+
+
+def _weighing(sizes: IntArray, coverages: FloatArray, weights: FloatArray, background: float) -> RefitTarget:
+    sums = packed_sums(sizes, coverages, weights, float(background), float(WEIGHT_STEPS))
+    return RefitTarget(sizes, coverages, weights, _read_only(sums))
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,36 +160,50 @@ def refit(
     there.
     Raises MeshError for vertices that are not finite.
     """
-    if not np.isfinite(mesh.vertices).all():
-        raise MeshError("the mesh to refit has vertices that are not finite: give finite positions")
-    shape = shape_for(mesh.topology, faces, bonds)
     moved = np.empty_like(mesh.vertices)
     before, after, n_evaluations = refit_kernels.refit(
         mesh.vertices,
-        shape,
-        target.pictures,
-        config.settings,
-        workspace(target.resolution, len(shape.loops)),
+        *shape_arguments(mesh.topology, faces, bonds),
+        target.coverages,
+        target.sums,
+        *config.settings,
+        workspace(target.resolution, len(mesh.topology.boundary_half_edges)),
         moved,
     )
+    if before != before:  # NaN
+        raise MeshError("the mesh to refit has vertices that are not finite: give finite positions")
     return RefitResult(mesh.with_vertices(moved), before, after, n_evaluations)
 
 
-def shape_for(topology: Topology, faces: FaceRule, bonds: Bonds | None) -> Shape:
-    """What the kernels need for a refit under a rule of faces and bonds."""
-    shape = shape_of(topology) if faces == "any" else _ruled(topology)
-    return shape if bonds is None else _bound(shape, bonds)
+class _Bound(NamedTuple):
+    """What a refit is told that is not the topology's own, in the order in which `shape_kernels.shape_of` reads it."""
+
+    boundary: IntArray
+    inner: IntArray
+    neighbours: IntArray
+    neighbour_offsets: IntArray
+    leader: IntArray = _NOTHING
+    on_axis: IntArray = _NOTHING
+    triples: IntArray = _NOTHING
+    rule_inner: IntArray = _NOTHING
+    rule_neighbours: IntArray = _NOTHING
+    rule_offsets: IntArray = _NOTHING
+    images: IntArray = _NOTHING
 
 
-def _picture(target: Target, background: float) -> Picture:
-    """The target as refits see it, where a pixel outside weighs `background`."""
-    if background == 1.0:
-        return picture_of(target)
-    return Picture(target.coverage, *sums_with_background(target, background))
+def shape_arguments(
+    topology: Topology, faces: FaceRule, bonds: Bonds | None
+) -> tuple[IntArray, IntArray, float, float]:
+    """What `shape_kernels.shape_of` is to be called with for a refit under a rule of faces and bonds."""
+    asked = 0.0 if faces == "any" else ASKED_TURN
+    if bonds is None:
+        return topology.packed, _NOTHING if faces == "any" else _packed_rule(topology), 0.5, asked
+    return topology.packed, _packed(_tied(topology, faces, bonds)), float(bonds.axis), asked
 
 
-def _bound(shape: Shape, bonds: Bonds) -> Shape:
-    """The shape with its unknowns tied; of two mirror images the first leads."""
+def _tied(topology: Topology, faces: FaceRule, bonds: Bonds) -> _Bound:
+    """The unknowns tied; of two mirror images the first leads."""
+    shape = _free(topology) if faces == "any" else _ruled(topology)
     numbers = np.full(len(bonds.images), -1, np.int64)
     numbers[shape.boundary] = np.arange(len(shape.boundary))
     own = numbers[shape.boundary]
@@ -165,64 +212,52 @@ def _bound(shape: Shape, bonds: Bonds) -> Shape:
     leader[bonds.locked[shape.boundary]] = -1
     free = [k for k, v in enumerate(shape.inner) if not bonds.locked[v]]
     parts = [shape.neighbours[shape.neighbour_offsets[k] : shape.neighbour_offsets[k + 1]] for k in free]
-    rule = shape.rule
-    if rule is not NO_RULE:
-        partners = np.where(images < 0, FREE, numbers[images])
-        rule = rule._replace(images=np.where(bonds.locked[shape.boundary], LOCKED, partners))
+    partners = np.where(images < 0, FREE, numbers[images])
     return shape._replace(
-        rule=rule,
         inner=shape.inner[free],
-        neighbours=np.concatenate([*parts, np.empty(0, np.int64)]),
+        neighbours=np.concatenate([*parts, _NOTHING]),
         neighbour_offsets=np.cumsum([0, *map(len, parts)]),
-        ties=Ties(leader, images == shape.boundary, float(bonds.axis)),
+        leader=leader,
+        on_axis=(images == shape.boundary).astype(np.int64),
+        images=_NOTHING if faces == "any" else np.where(bonds.locked[shape.boundary], LOCKED, partners),
     )
 
 
-@lru_cache(maxsize=4096)
-def shape_of(topology: Topology) -> Shape:
-    """What the kernels need of a topology."""
+def _free(topology: Topology) -> _Bound:
     arrays = topology.arrays
-    return Shape(
-        boundary=arrays.outer,  # writable, as under bonds and rules: the kernel is compiled for one type
-        loops=arrays.loops,
-        edges=arrays.edges,
-        on_rim=topology.is_boundary_edge,
-        corners=topology.corners,
-        offsets=topology.face_offsets,
-        inner=arrays.inner,
-        neighbours=arrays.neighbours,
-        neighbour_offsets=arrays.neighbour_offsets,
-    )
+    return _Bound(arrays.outer, arrays.inner, arrays.neighbours, arrays.neighbour_offsets)
 
 
-@lru_cache(maxsize=4096)
-def rule_of(topology: Topology) -> Rule:
-    """What the kernels need of the corners of faces. Unknowns are numbered as in `_ruled`, first the boundary's."""
-    shape = shape_of(topology)
+def _ruled(topology: Topology) -> _Bound:
+    """All vertices as unknowns, first those of the boundary, and their corners bound to turn."""
+    arrays = topology.arrays
+    boundary = np.concatenate((arrays.outer, arrays.inner))
     unknown = np.empty(topology.n_vertices, np.int64)
-    unknown[np.concatenate((shape.boundary, shape.inner))] = np.arange(topology.n_vertices)
-    at = unknown[topology.corners]
-    following = topology.arrays.following
+    unknown[boundary] = np.arange(topology.n_vertices)
+    at, following = unknown[arrays.corners], arrays.following
     triples = np.empty((len(at), 3), np.int64)
     triples[following] = np.column_stack((at, at[following], at[following[following]]))
-    return Rule(
-        triples,
-        unknown[shape.inner],
-        unknown[shape.neighbours],
-        shape.neighbour_offsets,
-        np.full(len(unknown), FREE),
-        ASKED_TURN,
+    return _Bound(
+        *(boundary, _NOTHING, _NOTHING, np.zeros(1, np.int64)),
+        triples=triples.ravel(),
+        rule_inner=unknown[arrays.inner],
+        rule_neighbours=unknown[arrays.neighbours],
+        rule_offsets=arrays.neighbour_offsets,
+        images=np.full(len(unknown), FREE),
     )
 
 
 @lru_cache(maxsize=4096)
-def _ruled(topology: Topology) -> Shape:
-    """`shape_of` with all vertices as unknowns and their corners bound to turn."""
-    shape, nothing = shape_of(topology), np.empty(0, np.int64)
-    return shape._replace(
-        boundary=np.concatenate((shape.boundary, shape.inner)),
-        inner=nothing,
-        neighbours=nothing,
-        neighbour_offsets=np.zeros(1, np.int64),
-        rule=rule_of(topology),
-    )
+def _packed_rule(topology: Topology) -> IntArray:
+    return _packed(_ruled(topology))
+
+
+def _packed(bound: _Bound) -> IntArray:
+    """The parts in one array, which begins with where each of them begins, and the last one ends."""
+    lengths = [len(bound) + 1, *map(len, bound)]
+    return _read_only(np.concatenate((np.cumsum(lengths), *bound)))
+
+
+def _read_only(array: AnyArray) -> AnyArray:
+    array.setflags(write=False)
+    return array

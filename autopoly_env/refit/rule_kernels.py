@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from autopoly_env.arrays import FloatArray, IntArray
-from autopoly_env.compute import kernel
+from autopoly_env.compute import kernel, uncounted_kernel
 
 _WEIGHT = 30.0  # of a squared pixel by which a corner is short of its turn, beside squared errors of pixels
 _FOLLOWING = 0.1  # the same, of a vertex off the boundary that moves otherwise than its neighbours do
@@ -29,10 +29,6 @@ class Rule(NamedTuple):
     asked: float  # the sine by which every corner should turn
 
 
-_NOTHING = np.empty(0, np.int64)
-NO_RULE = Rule(np.empty((0, 3), np.int64), _NOTHING, _NOTHING, _NOTHING, _NOTHING, 0.0)
-
-
 @kernel
 def hinge(
     rule: Rule, origin: FloatArray, unknowns: FloatArray, size: int, gradient: FloatArray, normal: FloatArray
@@ -42,8 +38,6 @@ def hinge(
     Adds half the gradient J'r to `gradient` (N, 2) and J'J to the lower triangle of `normal` (2N, 2N), both per pixel;
     an empty `normal` is left alone.
     """
-    if rule.triples.shape[0] == 0:
-        return 0.0
     loss = 0.0
     slope = np.empty(6)
     for c in range(rule.triples.shape[0]):
@@ -71,7 +65,7 @@ def hinge(
     return loss + _following(rule, origin, unknowns, size, gradient, normal)
 
 
-@kernel
+@uncounted_kernel
 def _following(
     rule: Rule, origin: FloatArray, unknowns: FloatArray, size: int, gradient: FloatArray, normal: FloatArray
 ) -> float:
@@ -104,8 +98,6 @@ def hold(rule: Rule, unknowns: FloatArray, low: float, high: float) -> None:
 
     One corner after the other, in sweeps, as position-based dynamics do (Müller et al. 2007).
     """
-    if rule.triples.shape[0] == 0:
-        return
     slope = np.empty((3, 2))
     for _sweep in range(_SWEEPS):
         n_short = 0

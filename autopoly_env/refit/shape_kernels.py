@@ -10,40 +10,66 @@ from typing import NamedTuple
 
 import numpy as np
 
-from autopoly_env.arrays import BoolArray, FloatArray, IntArray
-from autopoly_env.compute import kernel
+from autopoly_env.arrays import FloatArray, IntArray
+from autopoly_env.compute import inlined, kernel, uncounted_kernel
 from autopoly_env.mesh.corner_kernels import keeps_turns
-from autopoly_env.mesh.geometry_kernels import defects
+from autopoly_env.mesh.geometry_kernels import count_defects
+from autopoly_env.mesh.topology_kernels import links_in, part_of
 from autopoly_env.raster.derivative_kernels import half_gradient
 from autopoly_env.raster.raster_kernels import Picture, Workspace
-from autopoly_env.refit.rule_kernels import NO_RULE, Rule
+from autopoly_env.refit.rule_kernels import Rule, hold
 
 
 class Ties(NamedTuple):
     """What keeps unknowns from moving freely."""
 
     leader: IntArray  # (N,) the unknown of which this one is the mirror image; itself where it is none, -1 where locked
-    on_axis: BoolArray  # (N,) the unknowns that stay on the axis
+    on_axis: IntArray  # (N,) 1 for the unknowns that stay on the axis, 0 for the others
     axis: float  # x of the axis
-
-
-NO_TIES = Ties(np.empty(0, np.int64), np.empty(0, np.bool_), 0.5)
 
 
 class Shape(NamedTuple):
     """What the refit needs of a topology, as arrays."""
 
+    edges: IntArray  # (E, 2) these four are those of `Links`
+    sides: IntArray  # (E, 2)
+    corners: IntArray  # (H,)
+    offsets: IntArray  # (F+1,)
     boundary: IntArray  # (N,) vertex of each unknown
     loops: IntArray  # (B, 2) directed boundary edges between unknowns
-    edges: IntArray  # (E, 2) between vertices
-    on_rim: BoolArray  # (E,) whether an edge is the boundary's
-    corners: IntArray  # (H,) vertices of all faces, one face after the other
-    offsets: IntArray  # (F+1,) where each face starts in `corners`
     inner: IntArray  # (K,) vertices that are not on the boundary
     neighbours: IntArray  # vertices joined to each inner vertex, one after the other
     neighbour_offsets: IntArray  # (K+1,)
-    ties: Ties = NO_TIES  # where all unknowns are free
-    rule: Rule = NO_RULE  # where faces may have any corners
+    ties: Ties
+    rule: Rule
+
+
+@inlined
+def shape_of(packed: IntArray, bound: IntArray, axis: float, asked: float) -> Shape:
+    """What a refit needs of a packed topology.
+
+    `bound` is empty where all unknowns are free and faces may have any corners. Otherwise it is packed, too, and says
+    of the parts that are not the topology's own: boundary, inner, neighbours, neighbour_offsets; leader and on_axis of
+    `Ties`; triples, inner, neighbours, neighbour_offsets and images of `Rule`.
+    """
+    links = links_in(packed)
+    if len(bound) == 0:
+        nothing = packed[:0]
+        ties = Ties(nothing, nothing, axis)
+        rule = Rule(nothing.reshape((0, 3)), nothing, nothing, nothing, nothing, asked)
+        return Shape(
+            links.edges, links.sides, links.corners, links.offsets, links.outer, links.loops, links.inner,
+            links.neighbours, links.neighbour_offsets, ties, rule,
+        )  # fmt: skip
+    ties = Ties(part_of(bound, 4), part_of(bound, 5), axis)
+    rule = Rule(
+        part_of(bound, 6).reshape((-1, 3)), part_of(bound, 7), part_of(bound, 8), part_of(bound, 9), part_of(bound, 10),
+        asked,
+    )  # fmt: skip
+    return Shape(
+        links.edges, links.sides, links.corners, links.offsets, part_of(bound, 0), links.loops, part_of(bound, 1),
+        part_of(bound, 2), part_of(bound, 3), ties, rule,
+    )  # fmt: skip
 
 
 class Settings(NamedTuple):
@@ -64,6 +90,7 @@ class Progress(NamedTuple):
     start: FloatArray  # (V, 2)
     points: FloatArray  # (V, 2) of the best
     trial: FloatArray  # (V, 2) scratch
+    boxes: FloatArray  # (E, 4) scratch
     record: FloatArray  # (7,) LOSS at the current level, MOST_..., N_EVALUATIONS, LOW, HIGH
 
 
@@ -74,7 +101,7 @@ _SWEEPS = 30  # over the vertices off the boundary, at most
 _SETTLED = 1e-7  # unit square, that one of them moves in a sweep
 
 
-@kernel
+@uncounted_kernel
 def put(values: FloatArray, into: FloatArray) -> None:
     """Copy an array (n, m). Numba's own assignment would compile for seconds, for its texts of shapes that differ."""
     for i in range(values.shape[0]):
@@ -82,7 +109,7 @@ def put(values: FloatArray, into: FloatArray) -> None:
             into[i, j] = values[i, j]
 
 
-@kernel
+@uncounted_kernel
 def obey(ties: Ties, boundary: IntArray, best: Progress, unknowns: FloatArray) -> None:
     """Put the unknowns that are tied where their ties want them: locked ones at their start, images opposite."""
     if ties.leader.shape[0] == 0:
@@ -102,7 +129,7 @@ def obey(ties: Ties, boundary: IntArray, best: Progress, unknowns: FloatArray) -
             unknowns[n, 1] = unknowns[leader, 1]
 
 
-@kernel
+@uncounted_kernel
 def tie_gradient(ties: Ties, gradient: FloatArray) -> None:
     """Turn a gradient (N, 2) of free unknowns into that of the leading ones, 0 for those that do not lead."""
     if ties.leader.shape[0] == 0:
@@ -119,7 +146,7 @@ def tie_gradient(ties: Ties, gradient: FloatArray) -> None:
             gradient[n, 1] = 0.0
 
 
-@kernel
+@uncounted_kernel
 def tie_normal(ties: Ties, normal: FloatArray) -> None:
     """The same for the lower triangle of J'J (2N, 2N): rows and columns of images are added to those of their leaders,
     and all that do not lead become those of the unit matrix."""
@@ -146,7 +173,7 @@ def tie_normal(ties: Ties, normal: FloatArray) -> None:
         normal[k, k] = 1.0
 
 
-@kernel
+@uncounted_kernel
 def spread(unknowns: FloatArray, shape: Shape, best: Progress) -> None:
     """Write all V positions into `best.trial`: boundary vertices from `unknowns`, inner ones by their neighbours' mean
     move."""
@@ -175,11 +202,13 @@ def spread(unknowns: FloatArray, shape: Shape, best: Progress) -> None:
             return
 
 
-@kernel
+@uncounted_kernel
 def offer(unknowns: FloatArray, shape: Shape, loss: float, best: Progress) -> bool:
     """Keep the mesh if it is sane and its loss is the least so far; say whether it is sane."""
     spread(unknowns, shape, best)
-    crossings, hairlines, flipped = defects(best.trial, shape.edges, shape.on_rim, shape.corners, shape.offsets)
+    crossings, _, hairlines, flipped = count_defects(
+        best.trial, shape.edges, shape.sides, shape.corners, shape.offsets, best.boxes
+    )
     sane = crossings <= best.record[MOST_CROSSINGS] and flipped <= best.record[MOST_FLIPPED]
     sane = sane and hairlines <= best.record[MOST_HAIRLINES]
     sane = sane and keeps_rule(shape, best.trial, best.start)
@@ -189,7 +218,7 @@ def offer(unknowns: FloatArray, shape: Shape, loss: float, best: Progress) -> bo
     return sane
 
 
-@kernel
+@uncounted_kernel
 def keeps_rule(shape: Shape, points: FloatArray, start: FloatArray) -> bool:
     """Whether every corner turns as it should, or by no less than it did at the start."""
     if shape.rule.triples.shape[0] == 0:
@@ -197,7 +226,7 @@ def keeps_rule(shape: Shape, points: FloatArray, start: FloatArray) -> bool:
     return keeps_turns(points, start, shape.corners, shape.offsets, shape.rule.asked)
 
 
-@kernel
+@uncounted_kernel
 def loss_at(unknowns: FloatArray, shape: Shape, picture: Picture, work: Workspace, gradient: FloatArray) -> float:
     """Sum of squared coverage errors; half its gradient per pixel goes into `gradient` (N, 2)."""
     loss = half_gradient(unknowns, shape.loops, picture, work, gradient)
@@ -205,14 +234,14 @@ def loss_at(unknowns: FloatArray, shape: Shape, picture: Picture, work: Workspac
     return loss
 
 
-@kernel
+@uncounted_kernel
 def take_boundary(points: FloatArray, shape: Shape, unknowns: FloatArray) -> None:
     for k in range(shape.boundary.shape[0]):
         unknowns[k, 0] = points[shape.boundary[k], 0]
         unknowns[k, 1] = points[shape.boundary[k], 1]
 
 
-@kernel
+@uncounted_kernel
 def is_at(unknowns: FloatArray, shape: Shape, best: Progress) -> bool:
     """Whether the unknowns are those of the best mesh so far."""
     for k in range(shape.boundary.shape[0]):
@@ -228,3 +257,16 @@ def rebase(shape: Shape, picture: Picture, work: Workspace, scratch: FloatArray,
     unknowns = np.empty((shape.boundary.shape[0], 2))
     take_boundary(best.points, shape, unknowns)
     best.record[LOSS] = loss_at(unknowns, shape, picture, work, scratch)
+
+
+@kernel
+def hold_vertices(
+    points: FloatArray, packed: IntArray, bound: IntArray, axis: float, asked: float, low: float, high: float
+) -> None:
+    """`hold` of the unknowns among `points` (V, 2), in place; the arguments between are those of `shape_of`."""
+    shape = shape_of(packed, bound, axis, asked)
+    unknowns = np.empty((shape.boundary.shape[0], 2))
+    take_boundary(points, shape, unknowns)
+    hold(shape.rule, unknowns, low, high)
+    for k in range(shape.boundary.shape[0]):
+        points[shape.boundary[k], 0], points[shape.boundary[k], 1] = unknowns[k, 0], unknowns[k, 1]

@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from autopoly_env.mesh import FaceRule, PolyMesh
+from autopoly_env.mesh import ASKED_TURN, FaceRule, PolyMesh
 from autopoly_env.raster import pixels_of, workspace
-from autopoly_env.refit.refitting import Bonds, rule_of, shape_of
-from autopoly_env.refit.rule_kernels import NO_RULE
+from autopoly_env.refit.refitting import Bonds
 from autopoly_env.refit.tuning_kernels import tune as tune_in_place
 from autopoly_env.silhouette import Target
 
@@ -20,15 +19,14 @@ def tune(mesh: PolyMesh, target: Target, bonds: Bonds | None = None, faces: Face
     images = np.full(len(points), -1, np.int64)
     if bonds is not None:
         images = np.where(bonds.locked, -2, bonds.images)
-    edges = mesh.topology.boundary_half_edges
     tune_in_place(
         points,
-        edges,
-        shape_of(mesh.topology)._replace(rule=NO_RULE if faces == "any" else rule_of(mesh.topology)),
+        mesh.topology.packed,
         images,
         0.5 if bonds is None else bonds.axis,
+        0.0 if faces == "any" else ASKED_TURN,
         pixels_of(target),
         float(target.n_filled),
-        workspace(target.resolution, len(edges)),
+        workspace(target.resolution, len(mesh.topology.boundary_half_edges)),
     )
     return mesh.with_vertices(points)

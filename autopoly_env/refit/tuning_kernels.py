@@ -7,10 +7,11 @@ some tenths of a point.
 import numpy as np
 
 from autopoly_env.arrays import FloatArray, IntArray
-from autopoly_env.compute import kernel
+from autopoly_env.compute import kernel, uncounted_kernel
+from autopoly_env.mesh.corner_kernels import keeps_turns
 from autopoly_env.mesh.geometry_kernels import defects
+from autopoly_env.mesh.topology_kernels import links_in
 from autopoly_env.raster.raster_kernels import Pixels, Workspace, overlap_counts_in_rows
-from autopoly_env.refit.shape_kernels import Shape, keeps_rule
 
 _STEPS = (2.0, 1.0, 0.5, 0.25)  # pixels
 _N_DIRECTIONS = 8
@@ -18,7 +19,7 @@ _N_ROUNDS = 4  # with one step, at most
 _LEAST_GAIN = 1e-12  # of the IoU; less is rounding of weights
 
 
-@kernel
+@uncounted_kernel
 def _rows_around(v: int, image: int, points: FloatArray, edges: IntArray, margin: float, size: int) -> tuple[int, int]:
     """The rows, first to last - 1, that edges at vertex v or at its image cross when these move by at most `margin`."""
     low, high = points[v, 1], points[v, 1]
@@ -30,7 +31,7 @@ def _rows_around(v: int, image: int, points: FloatArray, edges: IntArray, margin
     return min(max(first, 0), size - 1), max(min(last, size), 1)
 
 
-@kernel
+@uncounted_kernel
 def _iou(inside: float, filled: float, n_filled: float) -> float:
     union = filled + n_filled - inside
     return inside / union if union > 0 else 1.0
@@ -38,25 +39,28 @@ def _iou(inside: float, filled: float, n_filled: float) -> float:
 
 @kernel
 def tune(
-    points: FloatArray, edges: IntArray, shape: Shape, images: IntArray, axis: float, pixels: Pixels,
+    points: FloatArray, packed: IntArray, images: IntArray, axis: float, asked: float, pixels: Pixels,
     n_filled: float, work: Workspace,
 ) -> None:  # fmt: skip
     """Move `points` (V, 2), in place, by pattern search on the IoU.
 
-    `edges` (B, 2) are the boundary's. `images` (V,) holds each vertex's mirror image about x = `axis`, -1 for a vertex
-    that has none, -2 for one that stays; `n_filled` is what the target's pixels weigh together. No crossing, no flipped
-    face and no corner against the rule of faces comes about, and nothing leaves the picture. A vertex changes the rows
-    only that its edges cross, so those are all that is counted again.
+    `packed` is their topology. `images` (V,) holds each vertex's mirror image about x = `axis`, -1 for a vertex that
+    has none, -2 for one that stays; corners are to turn by a sine of `asked`, 0 where faces may have any; `n_filled` is
+    what the target's pixels weigh together. No crossing, no flipped face and no corner against the rule of faces comes
+    about, and nothing leaves the picture. A vertex changes the rows only that its edges cross, so those are all that is
+    counted again.
     """
     size = pixels.mask.shape[0]
+    links = links_in(packed)
+    edges = links.boundary
     inside, filled = overlap_counts_in_rows(points, edges, pixels, work, 0, size)
-    crossings, hairlines, flipped = defects(points, shape.edges, shape.on_rim, shape.corners, shape.offsets)
+    crossings, _, hairlines, flipped = defects(points, packed)
     start = points.copy()
     for step in _STEPS:
         for _round in range(_N_ROUNDS):
             n_moved = 0
-            for k in range(shape.boundary.shape[0]):
-                v = shape.boundary[k]
+            for k in range(links.outer.shape[0]):
+                v = links.outer[k]
                 image = images[v]
                 if image == -2:
                     continue
@@ -77,11 +81,9 @@ def tune(
                     gain_inside, gain_filled = new_inside - part_inside, new_filled - part_filled
                     iou = _iou(inside + gain_inside, filled + gain_filled, n_filled)
                     if iou > _iou(inside, filled, n_filled) + _LEAST_GAIN:
-                        now_crossings, now_hairlines, now_flipped = defects(
-                            points, shape.edges, shape.on_rim, shape.corners, shape.offsets
-                        )
+                        now_crossings, _, now_hairlines, now_flipped = defects(points, packed)
                         sane = now_crossings <= crossings and now_hairlines <= hairlines and now_flipped <= flipped
-                        if sane and keeps_rule(shape, points, start):
+                        if sane and (asked == 0.0 or keeps_turns(points, start, links.corners, links.offsets, asked)):
                             inside, filled = inside + gain_inside, filled + gain_filled
                             n_moved += 1
                             first, last = _rows_around(v, image, points, edges, step / size, size)

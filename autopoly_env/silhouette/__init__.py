@@ -11,7 +11,6 @@ from autopoly_env.silhouette.silhouette import (
     Target,
     area_means,
     load_silhouette,
-    sums_with_background,
 )
 from autopoly_env.silhouette.thumbnail import thumbnail
 
@@ -34,7 +33,6 @@ __all__ = [
     "label_parts",
     "load_silhouette",
     "read_picture",
-    "sums_with_background",
     "thumbnail",
     "torn_corners",
 ]

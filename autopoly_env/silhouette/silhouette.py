@@ -207,17 +207,6 @@ def area_means(values: FloatArray, shape: tuple[int, int]) -> FloatArray:
     return values
 
 
-def sums_with_background(target: Target, background: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """`row_sum`, `row_square_sum` and `weight_sum` of a target whose cells outside weigh `background`, those inside 1.
-
-    Weights that the target has itself count as well. Read-only.
-    """
-    among = _NO_WEIGHTS if target.weights is None else target.weights
-    weights = _read_only(target_kernels.with_background(target.coverage, among, background, float(WEIGHT_STEPS)))
-    sums, squares, weight_sums = target_kernels.row_sums(target.coverage, weights)
-    return _read_only(sums), _read_only(squares), _read_only(weight_sums)
-
-
 def _read_only(array: AnyArray) -> AnyArray:
     array.setflags(write=False)
     return array

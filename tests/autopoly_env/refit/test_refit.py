@@ -12,9 +12,9 @@ from autopoly_env.compute import map_threads, set_threads
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.mesh.geometry_kernels import count_crossings
 from autopoly_env.raster import coverage
-from autopoly_env.raster.raster_kernels import Picture
 from autopoly_env.refit import FROM_AFAR, LOCAL, RefitConfig, RefitResult, RefitTarget, refit
-from autopoly_env.refit.refitting import shape_of
+from autopoly_env.refit.refitting import shape_arguments
+from autopoly_env.refit.shape_kernels import shape_of
 from autopoly_env.silhouette import Silhouette, Target
 from tests.helpers.shapes import frame, hourglass, pairs_that_meet, polygon
 from tests.helpers.strategies import meshes, random_walk
@@ -29,9 +29,7 @@ HALVES = PolyMesh.from_faces([(0.3, 0.3), (0.7, 0.3), (0.7, 0.7), (0.3, 0.7)], [
 def target_of(mesh: PolyMesh, resolution: int) -> RefitTarget:
     """A target whose pictures are exactly those of a mesh."""
     sizes = [max(min(8, resolution), resolution // divisor) for divisor in (8, 4, 2, 1)]
-    pictures = [Target(coverage(mesh, size)) for size in sizes]
-    a, b, c, d = (Picture(p.coverage, p.row_sum, p.row_square_sum) for p in pictures)
-    return RefitTarget((a, b, c, d))
+    return RefitTarget.of_levels([Target(coverage(mesh, size)) for size in sizes])
 
 
 def shaken(points: FloatArray, seed: int, length: float) -> FloatArray:
@@ -257,7 +255,7 @@ def test_refit__is_the_same_bit_for_bit_beside_others_on_any_number_of_threads()
 def test_shape__of_a_grid_by_hand() -> None:
     """2 x 2 quads: vertex 4 is the inner one, joined to 1, 3, 5 and 7."""
     grid = PolyMesh.grid(2, 0.0, 0.0, 1.0, 1.0)
-    shape = shape_of(grid.topology)
+    shape = shape_of.py_func(*shape_arguments(grid.topology, "any", None))
     assert sorted(shape.boundary.tolist()) == [0, 1, 2, 3, 5, 6, 7, 8]
     assert shape.inner.tolist() == [4]
     assert sorted(shape.neighbours.tolist()) == [1, 3, 5, 7]

@@ -20,8 +20,9 @@ from autopoly_env.refit import (
     refit,
     tune,
 )
-from autopoly_env.refit.refitting import rule_of
+from autopoly_env.refit.refitting import shape_arguments
 from autopoly_env.refit.rule_kernels import hinge
+from autopoly_env.refit.shape_kernels import shape_of
 from autopoly_env.silhouette import Silhouette
 from tests.helpers.drawings import noise, painted
 from tests.helpers.ruled import ruled_meshes
@@ -90,7 +91,7 @@ def test_refit__makes_no_corner_worse_that_breaks_the_rule_already(seed: int) ->
 def test_hinge__has_the_gradient_of_what_it_costs() -> None:
     """Against central differences; the asked turn is 0, so that lengths, which count as fixed, do not matter."""
     grid = PolyMesh.grid(2, 0.2, 0.2, 0.8, 0.8)
-    rule = replace_asked(rule_of(grid.topology))
+    rule = replace_asked(shape_of.py_func(*shape_arguments(grid.topology, "quads", None)).rule)
     order = np.concatenate((grid.topology.boundary_half_edges[:, 0], [4]))
     origin, rng = grid.vertices[order], np.random.default_rng(0)
     points = origin + rng.normal(0.0, 0.15, origin.shape)
