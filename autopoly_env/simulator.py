@@ -126,11 +126,13 @@ class Simulator:
         """
         size = resolution or self.resolution
         background = round(iou * _BACKGROUND_STEPS) / _BACKGROUND_STEPS
-        if (size, background) not in self._refit_targets:
-            if (size, 1.0) not in self._refit_targets:
-                self._refit_targets[size, 1.0] = RefitTarget.of(self.silhouette, size)
-            self._refit_targets[size, background] = self._refit_targets[size, 1.0].with_background(background)
-        return self._refit_targets[size, background]
+        known = self._refit_targets
+        if (size, background) not in known:
+            if (size, 1.0) not in known:
+                known[size, 1.0] = RefitTarget.of(self.silhouette, size)
+            if background != 1.0:
+                known[size, background] = known[size, 1.0].with_background(background)
+        return known[size, background]
 
     def settings(self) -> dict[str, Any]:
         """The rules as plain values, as a construction sequence keeps them."""
@@ -187,7 +189,9 @@ class Simulator:
         yield PolyMesh.rectangle(x0, y0, x1, y1)
         at_row_end = (np.diff(rows, prepend=-1) != 0) | (np.diff(rows, append=-1) != 0)  # these have the same hull
         centres = np.column_stack((columns, rows))[at_row_end] + 0.5
-        around = shapely.MultiPoint(centres / self.resolution).minimum_rotated_rectangle
+        if len(centres) == 1:
+            return
+        around = shapely.linestrings(centres / self.resolution).minimum_rotated_rectangle
         if isinstance(around, shapely.Polygon):
             corners = np.clip(shapely.get_coordinates(around.normalize())[:4], 0.0, 1.0)
             if not shapely.LinearRing(corners).is_ccw:

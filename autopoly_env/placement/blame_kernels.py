@@ -7,9 +7,32 @@ import numpy as np
 
 from autopoly_env.arrays import FloatArray, IntArray
 from autopoly_env.compute import kernel, uncounted_kernel
+from autopoly_env.raster.raster_kernels import Workspace, coverage_image
 
 MASS, FAR_X, FAR_Y, LOW, HIGH, DEPTH = range(6)
 AREA, DEEP_X, DEEP_Y, RADIUS, MEAN_X, MEAN_Y, VAR_X, VAR_Y, COV_XY = range(9)
+
+
+@kernel
+def difference_of(
+    points: FloatArray, boundary: IntArray, target: FloatArray, weights: FloatArray, threshold: float, work: Workspace
+) -> tuple[FloatArray, IntArray, int]:
+    """(R, R) the target's coverage less that of the mesh, its regions as `regions_of` labels them, and their number.
+
+    `boundary` (B, 2) are the mesh's directed edges. Where `weights` (R, R) are not empty, pixels of weight 0 do not
+    disagree, and the difference of the others counts as much as they weigh.
+    """
+    size = len(target)
+    difference = np.empty((size, size))
+    coverage_image(points, boundary, size, work, difference)
+    for row in range(size):
+        for column in range(size):
+            difference[row, column] = target[row, column] - min(difference[row, column], 1.0)
+    if len(weights) == 0:
+        labels, n_labels = regions_of(difference, threshold)
+        return difference, labels, n_labels
+    labels, n_labels = regions_of(np.where(weights > 0.0, difference, 0.0), threshold)
+    return difference * weights, labels, n_labels
 
 
 @kernel
@@ -22,27 +45,27 @@ def regions_of(difference: FloatArray, threshold: float) -> tuple[IntArray, int]
     labels = np.full((size, size), -1, np.int64)
     stack = np.empty(size * size, np.int64)
     n_labels = 0
-    for cell in range(size * size):
-        row, column = cell // size, cell % size
-        if labels[row, column] >= 0 or abs(difference[row, column]) <= threshold:
-            continue
-        missing = difference[row, column] > 0.0
-        labels[row, column] = n_labels
-        stack[0] = cell
-        height = 1
-        while height > 0:
-            height -= 1
-            row, column = stack[height] // size, stack[height] % size
-            for step_r, step_c in ((0, 1), (1, 0), (0, -1), (-1, 0)):
-                r, c = row + step_r, column + step_c
-                if r < 0 or c < 0 or r >= size or c >= size or labels[r, c] >= 0:
-                    continue
-                d = difference[r, c]
-                if abs(d) > threshold and (d > 0.0) == missing:
-                    labels[r, c] = n_labels
-                    stack[height] = r * size + c
-                    height += 1
-        n_labels += 1
+    for first_row in range(size):
+        for first_column in range(size):
+            first = difference[first_row, first_column]
+            if not abs(first) > threshold or labels[first_row, first_column] >= 0:
+                continue
+            labels[first_row, first_column] = n_labels
+            stack[0] = first_row * size + first_column
+            height = 1
+            while height > 0:
+                height -= 1
+                row, column = stack[height] // size, stack[height] % size
+                for step_r, step_c in ((0, 1), (1, 0), (0, -1), (-1, 0)):
+                    r, c = row + step_r, column + step_c
+                    if r < 0 or c < 0 or r >= size or c >= size or labels[r, c] >= 0:
+                        continue
+                    d = difference[r, c]
+                    if abs(d) > threshold and (d > 0.0) == (first > 0.0):
+                        labels[r, c] = n_labels
+                        stack[height] = r * size + c
+                        height += 1
+            n_labels += 1
     return labels, n_labels
 
 

@@ -9,17 +9,19 @@ from functools import cached_property
 import numpy as np
 import shapely
 
-from autopoly_env.arrays import FloatArray
+from autopoly_env.arrays import FloatArray, IntArray
 from autopoly_env.mesh import PolyMesh, defects_of
 from autopoly_env.operators.evidence import Blame, Region
 from autopoly_env.placement import blame_kernels
 from autopoly_env.placement.blame_kernels import AREA, DEEP_X, DEEP_Y, MASS
-from autopoly_env.raster import coverage
+from autopoly_env.raster import coverage, workspace
 from autopoly_env.silhouette import Silhouette
 
 RESOLUTION = 64  # at which disagreement is looked at
 THRESHOLD = 0.3  # of a pixel's coverage, above which it disagrees
 _MISSING, _EXCESS = 0, 1
+_NO_WEIGHTS = np.empty((0, 0))
+_NO_WEIGHTS.setflags(write=False)
 
 
 class Disagreement:
@@ -27,16 +29,43 @@ class Disagreement:
 
     def __init__(self, mesh: PolyMesh, silhouette: Silhouette) -> None:
         self.mesh = mesh
-        self.covered: FloatArray = np.minimum(coverage(mesh, RESOLUTION), 1.0)
-        target = silhouette.target(RESOLUTION)
-        self.target: FloatArray = target.coverage
-        self.difference: FloatArray = self.target - self.covered
-        if target.weights is None:
-            self.labels, self.n_regions = blame_kernels.regions_of(self.difference, THRESHOLD)
-        else:  # pixels of weight 0 do not disagree, the others count as much as they weigh
-            seen = np.where(target.weights > 0.0, self.difference, 0.0)
-            self.labels, self.n_regions = blame_kernels.regions_of(seen, THRESHOLD)
-            self.difference = self.difference * target.weights
+        self._silhouette = silhouette
+
+    @cached_property
+    def _found(self) -> tuple[FloatArray, IntArray, int]:
+        """Only where an operator asks: many actions do not depend on it."""
+        target, edges = self._silhouette.target(RESOLUTION), self.mesh.topology.boundary_half_edges
+        weights = _NO_WEIGHTS if target.weights is None else target.weights
+        work = workspace(RESOLUTION, len(edges))
+        found: tuple[FloatArray, IntArray, int] = blame_kernels.difference_of(
+            self.mesh.vertices, edges, target.coverage, weights, THRESHOLD, work
+        )
+        return found
+
+    @property
+    def target(self) -> FloatArray:
+        """(R, R) the target's coverage at R = `RESOLUTION`."""
+        return self._silhouette.target(RESOLUTION).coverage
+
+    @property
+    def covered(self) -> FloatArray:
+        """(R, R) the mesh's, at most 1."""
+        return np.minimum(coverage(self.mesh, RESOLUTION), 1.0)
+
+    @property
+    def difference(self) -> FloatArray:
+        """(R, R) the target's coverage less the mesh's, at R = `RESOLUTION`, as much as each pixel weighs."""
+        return self._found[0]
+
+    @property
+    def labels(self) -> IntArray:
+        """(R, R) the region of each pixel in which the two disagree, -1 for the others."""
+        return self._found[1]
+
+    @property
+    def n_regions(self) -> int:
+        """L, of connected pixels in which the two disagree."""
+        return self._found[2]
 
     @cached_property
     def blame(self) -> FloatArray:

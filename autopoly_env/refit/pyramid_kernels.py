@@ -43,7 +43,7 @@ def packed_sums(
         else:
             sums = row_sums(covered, counted)
         for part in sums:
-            for value in part.reshape(-1):
+            for value in part.flat:
                 packed[end] = value
                 end += 1
     return packed

@@ -32,6 +32,8 @@ from autopoly_env.refit.shape_kernels import (
     take_boundary,
 )
 
+_NEARLY_RIGHT = 1.0  # times R: a loss below it leaves next to nothing for the far phase to gain
+
 
 @kernel
 def refit(
@@ -77,7 +79,7 @@ def refit(
     loss_before = loss_at(unknowns, shape, fine, work, scratch)
 
     reached = _descend(unknowns, shape, pyramid, settings.first_level, settings, work, best)
-    if settings.n_far > 0:
+    if settings.n_far > 0 and reached > _NEARLY_RIGHT * fine.coverage.shape[0]:
         picture = pyramid[max(0, len(pyramid) - 3)]
         rebase(shape, picture, work, scratch, best)
         far_phase(unknowns, shape, picture, settings.n_far, work, best)

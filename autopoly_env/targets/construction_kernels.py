@@ -1,10 +1,50 @@
-"""Numba kernels that measure how far apart things are: edges of a mesh, corners of its outline, a point and a ring."""
+"""Numba kernels that say whether a random shape can be shown: what is how far apart, and whether faces overlap."""
 
 import numpy as np
 
 from autopoly_env.arrays import FloatArray, IntArray
 from autopoly_env.compute import kernel
 from autopoly_env.mesh.geometry_kernels import orientation
+from autopoly_env.mesh.topology_kernels import links_in
+from autopoly_env.raster.raster_kernels import Workspace, coverage_image
+
+_SLACK = 1e-9  # by which a pixel's coverage may round to more than all of it
+
+
+@kernel
+def is_sound(
+    points: FloatArray, packed: IntArray, area: float, gap: float, length: float, bend: float, cosine: float,
+    work: Workspace, image: FloatArray,
+) -> bool:  # fmt: skip
+    """Whether nothing crosses, overlaps or is flipped, and all that there is can be seen.
+
+    `packed` is the topology. The shape has at least `area`, in squares of its extent, the longer side of its box;
+    lengths are in extents, too (`is_clear`). `image` (R, R), a picture that shows whether faces overlap, is scratch.
+    """
+    links = links_in(packed)
+    low_x, low_y, high_x, high_y = np.inf, np.inf, -np.inf, -np.inf
+    for v in range(len(points)):
+        low_x, high_x = min(low_x, points[v, 0]), max(high_x, points[v, 0])
+        low_y, high_y = min(low_y, points[v, 1]), max(high_y, points[v, 1])
+    extent = max(high_x - low_x, high_y - low_y)
+    covered = 0.0
+    for f in range(len(links.offsets) - 1):
+        double = 0.0
+        for h in range(links.offsets[f], links.offsets[f + 1]):
+            a, b = links.half_edges[h, 0], links.half_edges[h, 1]
+            double += points[a, 0] * points[b, 1] - points[b, 0] * points[a, 1]
+        if not double > 0.0:
+            return False
+        covered += 0.5 * double
+    if covered < area * extent**2:
+        return False
+    if not is_clear(points, links.edges, links.boundary, gap * extent, length * extent, bend * extent, cosine):
+        return False
+    placed = np.empty((len(points), 2))
+    for v in range(len(points)):
+        placed[v, 0], placed[v, 1] = (points[v, 0] - low_x) / extent, (points[v, 1] - low_y) / extent
+    coverage_image(placed, links.boundary, len(image), work, image)
+    return image.max() <= 1.0 + _SLACK
 
 
 @kernel

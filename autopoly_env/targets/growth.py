@@ -5,6 +5,7 @@ picture when it is finished.
 """
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -12,8 +13,9 @@ import numpy as np
 from autopoly_env.arrays import FloatArray
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import HOLE_SIDES, OPERATORS, Action, Choice, HoleChoice, plan_hole
-from autopoly_env.raster import coverage
-from autopoly_env.targets.construction_kernels import clearance, is_clear
+from autopoly_env.raster import workspace
+from autopoly_env.targets import construction_kernels
+from autopoly_env.targets.construction_kernels import clearance
 from autopoly_env.targets.dice import Dice
 
 # What can change the outline by itself. `face_split` cannot: it comes with a `face_delete` of one of the two parts.
@@ -74,7 +76,8 @@ _CORNERS = ((-1, -1), (1, -1), (1, 1), (-1, 1))
 
 def _outline(mesh: PolyMesh) -> tuple[int, ...]:
     """The number of corners of each loop of the outline."""
-    return tuple(sorted(len(loop) for loop in mesh.topology.boundary_loops))
+    ends = mesh.topology.arrays.loop_ends.tolist()
+    return tuple(sorted(end - begin for begin, end in pairwise((0, *ends))))
 
 
 def _change(dice: Dice, operators: Sequence[str], mesh: PolyMesh, outlines: set[tuple[int, ...]]) -> list[Grown]:
@@ -116,8 +119,9 @@ def _step(
     made = OPERATORS[operator].apply(mesh, action.element, choice)
     if _outline(made) in outlines:
         return None
+    size = np.sqrt(mesh.face_areas().sum())
     for attempt in range(N_SHAKES):
-        shaken = _shaken(dice, mesh, made, action, 1.0 - attempt / N_SHAKES)
+        shaken = _shaken(dice, mesh, made, action, (1.0 - attempt / N_SHAKES) * SHAKE * size)
         if is_sound(shaken):
             return Grown(action, choice, shaken)
     return None
@@ -140,14 +144,13 @@ def _hole(dice: Dice, mesh: PolyMesh, action: Action) -> HoleChoice | None:
     return plan_hole(mesh, face, middle + radius * np.column_stack((np.cos(angles), np.sin(angles))))
 
 
-def _shaken(dice: Dice, mesh: PolyMesh, made: PolyMesh, action: Action, amount: float) -> PolyMesh:
-    """Every vertex of `made` at a new place: those that the action made far away, the others near."""
+def _shaken(dice: Dice, mesh: PolyMesh, made: PolyMesh, action: Action, length: float) -> PolyMesh:
+    """Every vertex of `made` at a new place: those that the action made far away, the others within `length`."""
     vertices = made.vertices.copy()
     n_new = made.next_vertex_id - mesh.next_vertex_id
     if action.operator in _MOVES:
         vertices[-n_new:] = _MOVES[action.operator](dice, mesh, action.element, vertices[-n_new:])
-    size = np.sqrt(mesh.face_areas().sum())
-    return made.with_vertices(vertices + amount * SHAKE * size * dice.array(*vertices.shape))
+    return made.with_vertices(vertices + length * dice.array(*vertices.shape))
 
 
 def _edge(mesh: PolyMesh, edge: int) -> tuple[FloatArray, FloatArray]:
@@ -179,14 +182,7 @@ _MOVES: dict[str, Callable[[Dice, PolyMesh, int, FloatArray], FloatArray]] = {
 
 def is_sound(mesh: PolyMesh) -> bool:
     """Whether nothing crosses, overlaps or is flipped, and all that there is can be seen."""
-    low = mesh.vertices.min(axis=0)
-    extent = float((mesh.vertices.max(axis=0) - low).max())
-    areas = mesh.face_areas()
-    if areas.min() <= 0.0 or areas.sum() < MIN_AREA * extent**2:
-        return False
-    boundary = mesh.topology.boundary_half_edges
-    limits = MIN_GAP * extent, MIN_LENGTH * extent, MIN_BEND * extent, MAX_COSINE
-    if not is_clear(mesh.vertices, mesh.edges, boundary, *limits):
-        return False
-    picture = coverage(mesh.with_vertices((mesh.vertices - low) / extent), OVERLAP_RESOLUTION)
-    return bool(picture.max() <= 1.0 + 1e-9)
+    limits, size = (MIN_AREA, MIN_GAP, MIN_LENGTH, MIN_BEND, MAX_COSINE), OVERLAP_RESOLUTION
+    work = workspace(size, len(mesh.topology.boundary_half_edges))
+    packed = mesh.topology.packed
+    return bool(construction_kernels.is_sound(mesh.vertices, packed, *limits, work, np.empty((size, size))))
