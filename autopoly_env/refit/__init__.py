@@ -5,12 +5,14 @@ from autopoly_env.refit.refitting import (
     DEFAULT,
     FROM_AFAR,
     LOCAL,
+    QUICK,
     THOROUGH,
     Bonds,
     RefitConfig,
     RefitResult,
     RefitTarget,
     holding,
+    quick_resolution,
     refit,
 )
 from autopoly_env.refit.tuning import tune
@@ -19,6 +21,7 @@ __all__ = [
     "DEFAULT",
     "FROM_AFAR",
     "LOCAL",
+    "QUICK",
     "THOROUGH",
     "Bonds",
     "RefitConfig",
@@ -26,6 +29,7 @@ __all__ = [
     "RefitTarget",
     "holding",
     "mended",
+    "quick_resolution",
     "refit",
     "tune",
 ]

@@ -12,14 +12,20 @@ from autopoly_env.compute import map_threads, set_threads
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.mesh.geometry_kernels import count_crossings
 from autopoly_env.raster import coverage
-from autopoly_env.refit import FROM_AFAR, LOCAL, RefitConfig, RefitResult, RefitTarget, refit
+from autopoly_env.refit import FROM_AFAR, LOCAL, QUICK, RefitConfig, RefitResult, RefitTarget, quick_resolution, refit
 from autopoly_env.refit.refitting import shape_arguments
 from autopoly_env.refit.shape_kernels import shape_of
 from autopoly_env.silhouette import Silhouette, Target
 from tests.helpers.shapes import frame, hourglass, pairs_that_meet, polygon
 from tests.helpers.strategies import meshes, random_walk
 
-CONFIGS = {"from afar": FROM_AFAR, "local": LOCAL, "plain": RefitConfig(), "free": RefitConfig(keep_defects=True)}
+CONFIGS = {
+    "from afar": FROM_AFAR,
+    "local": LOCAL,
+    "quick": QUICK,
+    "plain": RefitConfig(),
+    "free": RefitConfig(keep_defects=True),
+}
 SQUARE = PolyMesh.from_faces(
     [(0.25, 0.25), (0.5, 0.25), (0.75, 0.25), (0.75, 0.75), (0.25, 0.75)], [(0, 1, 2, 3, 4)]
 )  # with a subdivided edge
@@ -93,6 +99,19 @@ def test_refit__carries_a_square_across_the_image(resolution: int) -> None:
     known = PolyMesh.rectangle(0.35, 0.3, 0.95, 0.9)
     result = refit(PolyMesh.rectangle(0.05, 0.1, 0.5, 0.55), target_of(known, resolution))
     np.testing.assert_allclose(result.mesh.vertices, known.vertices, rtol=0, atol=1e-3 / resolution)
+
+
+@pytest.mark.parametrize("way", [(0.03, 0.0), (-0.05, 0.05), (0.1, -0.15)])
+def test_quick_refit__brings_a_square_home(way: tuple[float, float]) -> None:
+    known = PolyMesh.rectangle(0.35, 0.3, 0.75, 0.7)
+    target = target_of(known, quick_resolution(128))
+    result = refit(known.with_vertices(known.vertices + way), target, QUICK)
+    np.testing.assert_allclose(result.mesh.vertices, known.vertices, rtol=0, atol=0.1 / 128)
+
+
+@pytest.mark.parametrize(("whole", "quick"), [(1, 1), (8, 8), (16, 8), (64, 20), (128, 40), (512, 160)])
+def test_quick_resolution__is_five_sixteenths_but_no_less_than_8(whole: int, quick: int) -> None:
+    assert quick_resolution(whole) == quick
 
 
 def test_refit__finds_a_ring_again() -> None:
