@@ -17,7 +17,7 @@ _Start = TypeVar("_Start")
 Shape = Callable[[], PolyMesh]  # makes the mesh of a shape, or its rings as faces, holes wound backwards
 
 
-# A tree search is bounded also where its states cost no refit, as those of WarpNet, or nothing new is made.
+# A tree search is bounded also where its states cost no refit, as those of `nfap-mcts`, or nothing new is made.
 STATES_A_REFIT = 200  # states of a tree, and simulations, for each refit of the budget
 MOST_STATES = 200_000  # whatever the budget is: about 2 GB
 

@@ -37,13 +37,13 @@ class NfapMctsAgent(Agent):
         self._searcher = MctsAgent(replace(config, seeds=()), (), evaluator)
 
     def act(self, simulator: Simulator, state: State) -> Decision:
-        """Search a tree of its own from `state`; STOP where nothing in it is better, by WarpNet's measure."""
+        """Search a tree of its own from `state`; STOP where nothing in it is better, fitted as in the tree."""
         return self._searcher.act(simulator, state)
 
     def _search(self, simulator: Simulator, track: Track, meter: Meter) -> Iterator[Track]:
         """Search, commit the step with an exact refit, and so on.
 
-        A warp is less good than a refit, so the tree may hold nothing better although there is something: then the
+        Trees fit less well than whole refits, so one may hold nothing better although there is something: then the
         likeliest action is taken, until `patience` steps in a row have not improved the best shape.
         """
         best_total, failures = track.state.score.total, 0
@@ -60,7 +60,7 @@ class NfapMctsAgent(Agent):
                 best_total, failures = track.state.score.total, 0
 
     def _step(self, simulator: Simulator, state: State, meter: Meter) -> State | None:
-        """The state to go on from; None where nothing can be done. Warps are no refits, but take time and memory."""
+        """The state to go on from; None where nothing can be done. A tree takes no refits, but time and memory."""
         chosen = self._searcher.decide(simulator, state, Foresight(meter)).action
         candidates = [chosen]
         if chosen == STOP:
@@ -84,14 +84,16 @@ def nfap_prior(config: NfapPriorConfig, incumbents: Sequence[Agent] = ()) -> Age
 def nfap_mcts(config: NfapMctsConfig) -> Agent:
     """As `nfap_prior`; seeds it has none."""
     _require_torch("nfap-mcts")
-    from agents.guided.evaluator import WarpEvaluator
+    from agents.guided.evaluator import QuickEvaluator, WarpEvaluator
     from agents.guided.weights import load_nfap, load_warpnet
 
     net, meta = load_nfap(config.nfap_weights)
     _check_n(config, net.config.n)
+    placed = config.start == "placed"
+    if config.geometry == "quick":
+        return NfapMctsAgent(config, QuickEvaluator(net, meta, config.temperature, placed))
     warp, _ = load_warpnet(config.warpnet_weights)
-    evaluator = WarpEvaluator(net, meta, warp, config.temperature, config.start == "placed")
-    return NfapMctsAgent(config, evaluator)
+    return NfapMctsAgent(config, WarpEvaluator(net, meta, warp, config.temperature, placed))
 
 
 def _require_torch(name: str) -> None:

@@ -117,17 +117,24 @@ class NfapPriorConfig(MctsConfig):
 
 @dataclass(frozen=True)
 class NfapMctsConfig(NfapPriorConfig):
-    """`nfap-mcts`: the paper's Algorithm 1, refits only where a step is committed."""
+    """`nfap-mcts`: the paper's Algorithm 1, whole refits only where a step is committed.
+
+    In the tree vertices go where a quick refit takes them, or, as in the paper, WarpNet.
+    """
 
     seeds: tuple[str, ...] = ()
     n_simulations: int = 16
     n_expanded: int = 4
+    patience: int = 3
     hop_patience: int = 0
     n_rollout: int = 0  # the paper plays on from a leaf; measured, that gives nothing here and takes four times as long
-    warpnet_weights: str = ""  # as nfap_weights
+    geometry: Literal["quick", "warpnet"] = "quick"
+    warpnet_weights: str = ""  # as nfap_weights; for geometry=warpnet
     start: Literal["placed", "plain"] = "placed"  # new vertices begin at the disagreement, or where the operator puts
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.seeds:
             raise ConfigError(f"seeds {self.seeds}: nfap-mcts begins at the rectangle; leave them out")
+        if self.warpnet_weights and self.geometry != "warpnet":
+            raise ConfigError(f"warpnet_weights are not used with geometry={self.geometry}: give geometry=warpnet")

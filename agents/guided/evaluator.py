@@ -1,4 +1,4 @@
-"""`NfapEvaluator` and `WarpEvaluator`: the networks as what the search is told about states.
+"""`NfapEvaluator`, `WarpEvaluator`, `QuickEvaluator`: the networks as what the search is told about states.
 
 A prior is a softmax over the legal actions of `NfapNet.choice_logits`: the predicted operator's probability, shared out
 among its legal elements by what the predicted region image shows at each of them. Where the score has another price of
@@ -6,6 +6,7 @@ complexity than the weights were trained with, every logit is corrected by what 
 for a softmax of r_all over a temperature is exact. Letters: A actions, K operator classes, S pixels a side.
 """
 
+from abc import abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
@@ -20,10 +21,13 @@ from agents.guided.weights import NetworkMeta
 from agents.search.batched import BatchedEvaluator
 from agents.search.evaluator import ResidualEvaluator
 from autopoly_env.arrays import AnyArray, FloatArray
+from autopoly_env.compute import map_threads
 from autopoly_env.errors import IllegalActionError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import Action, Choice, operator_named
 from autopoly_env.placement import Disagreement, tried
+from autopoly_env.refit import QUICK, quick_resolution, refit
+from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator, State
 
 _FLOOR = 1e-4  # of the likeliest action, for all
@@ -73,20 +77,21 @@ class NfapEvaluator(BatchedEvaluator[Foresight]):
         return [said.row(row) for row in range(len(states))]
 
 
-class WarpEvaluator(NfapEvaluator):
-    """nFAP-Net's priors and WarpNet's geometry, no refit at all: the paper's Algorithm 1.
+class CarryingEvaluator(NfapEvaluator):
+    """nFAP-Net's priors, and no whole refit: the action is applied, then a subclass carries the vertices (`_carried`).
 
-    The action is applied, then every vertex goes where the warp of the rendering to the target takes it. `placed`: new
-    vertices begin where rendering and target disagree, as before a refit. A warp that makes a shape worse is not taken.
-    Locked vertices, symmetry and a rule of faces only a refit can heed: where a user has asked for them, it is refits
-    after all.
+    `placed`: new vertices begin where rendering and target disagree, as before a refit. What makes a shape worse is not
+    taken. Locked vertices, symmetry and a rule of faces only a transition can heed: where a user has asked for them, it
+    is refits after all.
     """
 
-    def __init__(
-        self, net: NfapNet, meta: NetworkMeta, warp: WarpNet, temperature: float = 1.0, placed: bool = True
-    ) -> None:
+    def __init__(self, net: NfapNet, meta: NetworkMeta, temperature: float = 1.0, placed: bool = True) -> None:
         super().__init__(net, meta, temperature)
-        self._warp, self._placed = warp, placed
+        self._placed = placed
+
+    @abstractmethod
+    def _carried(self, simulator: Simulator, state: State, meshes: Sequence[PolyMesh]) -> list[PolyMesh]:
+        """The meshes right after actions in `state`, with their vertices where they are to be."""
 
     def expand(self, simulator: Simulator, state: State, actions: Sequence[Action]) -> list[State]:
         if simulator.guidance.locked or simulator.guidance.axis is not None or simulator.faces != "any":
@@ -96,10 +101,10 @@ class WarpEvaluator(NfapEvaluator):
         begun = list(self._begin(simulator, state, actions))
         if not begun:
             return []
-        warped = self._warped(simulator, [mesh for _, _, mesh in begun])
+        carried = self._carried(simulator, state, [mesh for _, _, mesh in begun])
         made = [
             _better(simulator, state, action, choice, before, after)
-            for (action, choice, before), after in zip(begun, warped, strict=True)
+            for (action, choice, before), after in zip(begun, carried, strict=True)
         ]
         return self._noted(simulator, made)
 
@@ -120,16 +125,39 @@ class WarpEvaluator(NfapEvaluator):
             except IllegalActionError:
                 continue
 
-    def _warped(self, simulator: Simulator, meshes: Sequence[PolyMesh]) -> list[PolyMesh]:
-        """The meshes with their vertices carried by the warps of each to the target."""
-        size = self._warp.config.image_size
-        target = simulator.silhouette.target(size).coverage.astype(np.float32)
-        pictures = np.stack([np.stack((rendering(mesh, size), target)) for mesh in meshes])
-        vertices = _padded([mesh.vertices.astype(np.float32) for mesh in meshes], 0)
-        edges = _padded([mesh.topology.boundary_half_edges for mesh in meshes], -1)
-        with torch.no_grad():
-            carried = self._warp.warps(torch.from_numpy(pictures), vertices, edges)[-1].vertices.double().numpy()
-        return [mesh.with_vertices(row[: len(mesh.vertices)]) for row, mesh in zip(carried, meshes, strict=True)]
+
+class WarpEvaluator(CarryingEvaluator):
+    """WarpNet's geometry, the paper's Algorithm 1: vertices go where the warp of the rendering to the target does."""
+
+    def __init__(
+        self, net: NfapNet, meta: NetworkMeta, warp: WarpNet, temperature: float = 1.0, placed: bool = True
+    ) -> None:
+        super().__init__(net, meta, temperature, placed)
+        self._warp = warp
+
+    def _carried(self, simulator: Simulator, state: State, meshes: Sequence[PolyMesh]) -> list[PolyMesh]:
+        return carried_by(self._warp, [simulator.silhouette] * len(meshes), meshes)
+
+
+def carried_by(net: WarpNet, silhouettes: Sequence[Silhouette], meshes: Sequence[PolyMesh]) -> list[PolyMesh]:
+    """The meshes with their vertices carried by the warps of each to its silhouette; one batch."""
+    size = net.config.image_size
+    targets = [silhouette.target(size).coverage for silhouette in silhouettes]
+    shown = [rendering(mesh, size) for mesh in meshes]
+    pictures = np.stack([np.stack(pair) for pair in zip(shown, targets, strict=True)]).astype(np.float32)
+    vertices = _padded([mesh.vertices.astype(np.float32) for mesh in meshes], 0)
+    edges = _padded([mesh.topology.boundary_half_edges for mesh in meshes], -1)
+    with torch.no_grad():
+        carried = net.warps(torch.from_numpy(pictures), vertices, edges)[-1].vertices.double().numpy()
+    return [mesh.with_vertices(row[: len(mesh.vertices)]) for row, mesh in zip(carried, meshes, strict=True)]
+
+
+class QuickEvaluator(CarryingEvaluator):
+    """Quick refits for geometry (`autopoly_env.refit.QUICK`): most of what a whole one gains, sooner than WarpNet."""
+
+    def _carried(self, simulator: Simulator, state: State, meshes: Sequence[PolyMesh]) -> list[PolyMesh]:
+        target = simulator.refit_target(state.score.iou, quick_resolution(simulator.resolution))
+        return map_threads(lambda mesh: refit(mesh, target, QUICK).mesh, meshes)
 
 
 def _padded(arrays: Sequence[AnyArray], padding: int) -> torch.Tensor:
@@ -143,7 +171,7 @@ def _padded(arrays: Sequence[AnyArray], padding: int) -> torch.Tensor:
 def _better(
     simulator: Simulator, state: State, action: Action, choice: Choice | None, before: PolyMesh, after: PolyMesh
 ) -> State:
-    """The state after an action: the better of the shapes before and after the warp."""
+    """The state after an action: the better of the shapes before and after its vertices are carried."""
     states = [simulator.initial(mesh) for mesh in (before, after)]
     best = max(states, key=lambda made: made.score.total)
     step = state.step + 1

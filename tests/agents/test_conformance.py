@@ -34,7 +34,7 @@ def options(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any
     nfap = {"nfap_weights": networks["nfap"], "n": 2, "n_expanded": 1, **few}
     return {
         "nfap-prior": {**nfap, "seeds": (), "hop_patience": 1},
-        "nfap-mcts": {**nfap, "warpnet_weights": networks["warpnet"]},
+        "nfap-mcts": {**nfap, "geometry": "warpnet", "warpnet_weights": networks["warpnet"]},
         "choice-prior": {"weights": saved_choice(folder), "seeds": (), "hop_patience": 1, **few},
         "rl-prior": {**weights, **few},
         **dict.fromkeys(POLICIES, weights),

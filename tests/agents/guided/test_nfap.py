@@ -15,7 +15,7 @@ import torch
 
 from agents.budget import Budget
 from agents.guided.config import CLASSES, NfapConfig, WarpConfig, class_of
-from agents.guided.evaluator import NfapEvaluator, WarpEvaluator
+from agents.guided.evaluator import CarryingEvaluator, NfapEvaluator, QuickEvaluator, WarpEvaluator
 from agents.guided.measures import N_MEASURES, action_measures, action_spots
 from agents.guided.nfap import NfapLabels, NfapNet, candidates_of, loss_terms
 from agents.guided.pictures import draw_inputs
@@ -25,12 +25,12 @@ from agents.guided.weights import SHIPPED, NetworkMeta, load_nfap, load_warpnet
 from agents.registry import make_agent
 from agents.search.evaluator import ResidualEvaluator
 from autopoly_env.errors import ConfigError
-from autopoly_env.mesh import PolyMesh
+from autopoly_env.mesh import PolyMesh, is_sane
 from autopoly_env.operators import OPERATORS, PRESETS, STOP, Action, legal_actions
 from autopoly_env.placement import Disagreement
 from autopoly_env.raster import coverage
 from autopoly_env.score import ScoreWeights
-from autopoly_env.simulator import Simulator
+from autopoly_env.simulator import Simulator, State
 from tests.helpers.drawings import BOTTLE, FRAME, HOUSE, painted
 from tests.helpers.networks import PAPER, RICH, make_net, saved_networks
 from tests.helpers.paths import ROOT
@@ -294,13 +294,20 @@ def test_untrained_prior__with_the_residual_is_near_it() -> None:
     assert make_evaluator(net).prior(simulator, state, actions) == pytest.approx(expected, abs=1e-3)
 
 
-@pytest.mark.parametrize("placed", [True, False])
-def test_warp_expand__needs_no_refit_and_is_never_worse_than_the_bare_action(placed: bool) -> None:
-    simulator = game(BOTTLE)
+def carrying(geometry: str, placed: bool) -> CarryingEvaluator:
+    if geometry == "quick":
+        return QuickEvaluator(make_net(), meta_of({}), placed=placed)
     torch.manual_seed(1)
     warp = WarpNet(WarpConfig(image_size=32, grid=4, feature=16, widths=(4, 4, 8, 8)))
     torch.nn.init.normal_(warp.head.weight, std=0.01)
-    evaluator = WarpEvaluator(make_net(), meta_of({}), warp, placed=placed)
+    return WarpEvaluator(make_net(), meta_of({}), warp, placed=placed)
+
+
+@pytest.mark.parametrize("geometry", ["warpnet", "quick"])
+@pytest.mark.parametrize("placed", [True, False])
+def test_carrying_expand__needs_no_refit_and_is_never_worse_than_the_bare_action(geometry: str, placed: bool) -> None:
+    simulator = game(BOTTLE)
+    evaluator = carrying(geometry, placed)
     state = simulator.initial()
     actions = simulator.legal_actions(state)[1:]
     children = evaluator.expand(simulator, state, actions)
@@ -317,12 +324,22 @@ def test_warp_expand__needs_no_refit_and_is_never_worse_than_the_bare_action(pla
 # --- agents ---
 
 
+def geometry_of(geometry: str, weights: dict[str, str]) -> dict[str, str]:
+    """Options of `nfap-mcts`."""
+    return {"geometry": geometry} | ({"warpnet_weights": weights["warpnet"]} if geometry == "warpnet" else {})
+
+
+def test_mcts_with_networks__refuses_weights_that_it_would_not_use(weights: dict[str, str]) -> None:
+    with pytest.raises(ConfigError, match="not used with geometry=quick: give geometry=warpnet"):
+        make_agent("nfap-mcts", warpnet_weights=weights["warpnet"])
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["nfap-prior", "nfap-mcts"])
 def test_agent__plays(name: str, weights: dict[str, str]) -> None:
     options: dict[str, Any] = {"nfap_weights": weights["nfap"], "n": 2, "n_simulations": 4}
     if name == "nfap-mcts":
-        options |= {"warpnet_weights": weights["warpnet"], "n_rollout": 1}
+        options |= {"geometry": "warpnet", "warpnet_weights": weights["warpnet"], "n_rollout": 1}
     simulator = game(HOUSE, max_steps=3)
     first, second = (make_agent(name, **options).solve(simulator, Budget(refits=60)) for _ in range(2))
     assert first.score.total >= simulator.final_score(simulator.initial().mesh).total
@@ -330,20 +347,39 @@ def test_agent__plays(name: str, weights: dict[str, str]) -> None:
     assert first.sequence.final() == first.mesh
 
 
+def test_quick_expand__has_what_quick_refits_have_and_breaks_no_mesh() -> None:
+    simulator = game(BOTTLE)
+    state = simulator.initial()
+    children = carrying("quick", placed=True).expand(simulator, state, simulator.legal_actions(state)[1:])
+    bare = [simulator.trial_of(Disagreement(state.mesh, simulator.silhouette), _taken(child)) for child in children]
+    gains = [
+        child.score.iou - simulator.score(trial.starts[0].mesh).iou for child, trial in zip(children, bare, strict=True)
+    ]
+    assert max(gains) > 0.02 and sum(gains) > 0.0
+    assert all(is_sane(child.mesh) for child in children)
+
+
+def _taken(state: State) -> Action:
+    assert state.action is not None
+    return state.action
+
+
 @pytest.mark.slow
-def test_mcts_with_networks__refits_only_what_it_commits(weights: dict[str, str]) -> None:
+@pytest.mark.parametrize("geometry", ["warpnet", "quick"])
+def test_mcts_with_networks__refits_only_what_it_commits(weights: dict[str, str], geometry: str) -> None:
     agent = make_agent(
-        "nfap-mcts", nfap_weights=weights["nfap"], warpnet_weights=weights["warpnet"], n=2, n_simulations=8
+        "nfap-mcts", nfap_weights=weights["nfap"], n=2, n_simulations=8, **geometry_of(geometry, weights)
     )
     solution = agent.solve(game(BOTTLE, max_steps=2))
     assert solution.stats.n_refits <= 2 + 2 * 3  # two rectangles, then at most three starts for each of two steps
 
 
 @pytest.mark.slow
-def test_mcts_with_networks__ends_where_its_simulations_do_not(weights: dict[str, str]) -> None:
-    """Warps cost no refit, so that a budget of refits alone would be no bound."""
+@pytest.mark.parametrize("geometry", ["warpnet", "quick"])
+def test_mcts_with_networks__ends_where_its_simulations_do_not(weights: dict[str, str], geometry: str) -> None:
+    """Warps and quick refits cost no refit, so that a budget of refits alone would be no bound."""
     agent = make_agent(
-        "nfap-mcts", nfap_weights=weights["nfap"], warpnet_weights=weights["warpnet"], n=2, n_simulations=10**9
+        "nfap-mcts", nfap_weights=weights["nfap"], n=2, n_simulations=10**9, **geometry_of(geometry, weights)
     )
     assert agent.solve(game(BOTTLE), Budget(refits=1)).stats.stopped_by in ("refits", "states")
     assert agent.solve(game(BOTTLE), Budget(seconds=0.5)).stats.stopped_by == "seconds"
@@ -353,7 +389,7 @@ def test_mcts_with_networks__ends_where_its_simulations_do_not(weights: dict[str
 def test_agent__leaves_locked_vertices_where_they_are(name: str, weights: dict[str, str]) -> None:
     start = PolyMesh.rectangle(0.3, 0.3, 0.7, 0.7)
     simulator = Simulator(painted(BOTTLE), resolution=64, max_steps=2, start=start, locked=[0])
-    options = {"warpnet_weights": weights["warpnet"]} if name == "nfap-mcts" else {}
+    options = geometry_of("warpnet", weights) if name == "nfap-mcts" else {}
     solution = make_agent(name, nfap_weights=weights["nfap"], n=2, n_simulations=2, **options).solve(simulator)
     assert solution.sequence.steps and solution.mesh.vertices[solution.mesh.vertex_index(0)].tolist() == [0.3, 0.3]
 
