@@ -35,6 +35,7 @@ from autopoly_env.silhouette import Silhouette
 from autopoly_env.simulator import Simulator
 
 _N_TRIED = 10  # neighbours that are refitted, those that are best as they are
+_FROM_AFAR = replace(FROM_AFAR, n_near=40, tolerance=4e-4)  # an outline that lies far off, in no hurry
 _N_THOROUGH = 3  # constructions that are refitted again, harder, before the climb ends
 _LEAST_GAIN = 1e-9
 START_SHARE = 0.5  # of the IoU that the start has on its own target: with less it is on another part of the shape
@@ -213,7 +214,7 @@ def align(simulator: Simulator, sequence: ConstructionSequence, meter: Meter) ->
         for told in _both_ways(sequence)
         for laid in _allowed(_alike(_laid_over(told.final(), simulator), simulator, told.final()), simulator)
     ]
-    from_afar = _refitted(simulator, found, FROM_AFAR)
+    from_afar = _refitted(simulator, found, _FROM_AFAR)
     again = _refitted(simulator, from_afar, THOROUGH)
     fitted = [max(one, other, key=total_of) for one, other in zip(from_afar, again, strict=True)]
     aligned = [first_settled(simulator, [one]) for one in sorted(fitted, key=total_of, reverse=True)]
