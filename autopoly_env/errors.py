@@ -45,5 +45,9 @@ class EpisodeError(AutoPolyError):
     """An environment used out of turn: before a reset, or after the episode's end."""
 
 
+class WorkerError(AutoPolyError):
+    """A worker process that has died, or is asked for something after its end."""
+
+
 class ConformanceError(AutoPolyError):
     """A part that breaks one of the rules the others rely on."""

@@ -50,6 +50,7 @@ TABLES = {
         operators: an action becomes a mesh | raster: exact coverage, exact derivatives | viewer: pictures of meshes
         mesh: PolyMesh: vertices, faces, their topology
         silhouette: an image becomes a mask
+        workers: processes that are asked
         compute: kernels, threads | files | outside
         arguments: values that people type
         errors

@@ -8,7 +8,6 @@ import contextlib
 import heapq
 import itertools
 import multiprocessing
-import multiprocessing.resource_tracker
 import os
 import pickle
 import re
@@ -27,13 +26,13 @@ from typing import Any, Generic, TypeVar
 
 from autopoly_env.errors import AutoPolyError, ConfigError
 from autopoly_env.shown import told
+from autopoly_env.workers import how_it_died, no_interrupts
 
 Task = TypeVar("Task")
 Value = TypeVar("Value")
 
 ENGINES = ("serial", "process", "ray")
 N_TRIES = 2  # of a task whose worker dies
-DYING = 10.0  # seconds that a process may take to end after it has closed its pipe
 RAY_PATIENCE = 12.0  # seconds to wait for a cluster's answer
 RAY_AHEAD = 8  # tasks a CPU that Ray is given ahead, so that no CPU waits for us
 N_LOSSES = 30  # of one task's workers to the system (a node that dies, memory that runs out), before it is given up
@@ -226,10 +225,8 @@ class _Worker:
 
     def how_it_died(self) -> str:
         """Its signal or exit code, once its pipe is broken."""
-        self._process.join(DYING)
-        code = self._process.exitcode
-        self.stop()
-        return f"signal {signal.Signals(-code).name}" if code is not None and code < 0 else f"exit code {code}"
+        self.pipe.close()
+        return how_it_died(self._process)
 
 
 def _work(pipe: Connection, function: Callable[[Any], Any]) -> None:
@@ -266,31 +263,6 @@ def _environment(variables: dict[str, str]) -> Iterator[None]:
                 del os.environ[name]
             else:
                 os.environ[name] = value
-
-
-@contextmanager
-def no_interrupts() -> Iterator[None]:
-    """Ctrl-C goes to all processes of a terminal: those that are started within never hear of it, their parent does,
-    once they have been started: half a start would be a worker that complains of a torn pipe.
-    """
-    if not hasattr(signal, "pthread_sigmask"):  # on Windows
-        yield
-        return
-    # The first start of a process starts Python's resource tracker, and that would let interrupts through again.
-    multiprocessing.resource_tracker.ensure_running()
-    came: list[int] = []
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    # The mask is of this thread alone: where another one takes the signal, Python calls the handler in this one still.
-    is_main = threading.current_thread() is threading.main_thread()
-    handler = signal.signal(signal.SIGINT, lambda number, frame: came.append(number)) if is_main else None
-    try:
-        yield
-    finally:
-        if handler is not None:
-            signal.signal(signal.SIGINT, handler)
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        if came:
-            signal.raise_signal(signal.SIGINT)
 
 
 # Ray

@@ -174,6 +174,21 @@ def test_reset__to_a_seed_of_before_draws_no_target_and_begins_alike() -> None:
     assert {name: str(value) for name, value in info.items()} == {name: str(v) for name, v in info_again.items()}
 
 
+def test_reset_that_was_prepared__is_the_same() -> None:
+    prepared, plain = make(), make()
+    for env in (prepared, plain):
+        env.reset(seed=3)
+    for env in (prepared, plain):
+        play(env, 2)
+    prepared.prepare_reset()
+    assert prepared.clone_state().best_r_all == plain.clone_state().best_r_all
+    for _ in range(2):
+        seen = prepared.reset(), plain.reset()
+        assert all(same(a, b) for a, b in zip(*seen, strict=True))
+        assert prepared.simulator.n_refits == plain.simulator.n_refits
+    assert same(prepared.reset(seed=8)[0], plain.reset(seed=8)[0])
+
+
 def test_reset__after_other_targets_were_put_in_place_draws_those() -> None:
     env, other = make(targets=Counting()), Counting()
     env.reset(seed=5)

@@ -12,10 +12,7 @@ from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
 from autopoly_env.compute import set_threads
 from autopoly_env.errors import ConfigError, EpisodeError, IllegalActionError
 from autopoly_env.vector_env import AutoPolyVectorEnv
-
-NAME = "autopoly_env:AutoPoly-v0"
-SMALL: dict[str, Any] = {"resolution": 16, "obs_resolution": 16, "max_steps": 6, "max_vertices": 16}
-MODES = list(AutoresetMode)
+from tests.helpers.many import MODES, NAME, SMALL, rollout, same
 
 
 def native(n: int = 3, mode: AutoresetMode = AutoresetMode.NEXT_STEP, **settings: Any) -> AutoPolyVectorEnv:
@@ -30,32 +27,6 @@ def sync(n: int = 3, mode: AutoresetMode = AutoresetMode.NEXT_STEP) -> SyncVecto
     return gymnasium.make_vec(
         NAME, num_envs=n, vectorization_mode="sync", vector_kwargs={"autoreset_mode": mode}, **SMALL
     )
-
-
-def same(a: Any, b: Any) -> bool:
-    """Whether nested dicts, arrays and values are equal bit for bit."""
-    if isinstance(a, dict):
-        return a.keys() == b.keys() and all(same(a[key], b[key]) for key in a)
-    if isinstance(a, np.ndarray) and a.dtype == object:
-        return all(same(x, y) for x, y in zip(a, b, strict=True))
-    if isinstance(a, np.ndarray):
-        return a.dtype == b.dtype and np.array_equal(a, b)
-    return type(a) is type(b) and a == b
-
-
-def rollout(envs: Any, n_steps: int, mode: AutoresetMode) -> list[Any]:
-    """All that comes out of random legal actions; ended environments are reset by hand where nobody else does it."""
-    rng = np.random.default_rng(0)
-    seen: list[Any] = [envs.reset(seed=5)]
-    masks = seen[0][1]["action_mask"]
-    for _ in range(n_steps):
-        actions = np.array([rng.choice(np.flatnonzero(mask)) for mask in masks])
-        seen.append(envs.step(actions))
-        masks, over = seen[-1][4]["action_mask"].copy(), seen[-1][2] | seen[-1][3]
-        if mode == AutoresetMode.DISABLED and over.any():
-            seen.append(envs.reset(options={"reset_mask": over}))
-            masks[over] = seen[-1][1]["action_mask"][over]
-    return seen
 
 
 @pytest.mark.slow

@@ -18,10 +18,10 @@ from agents.guided.config import NfapConfig, WarpConfig
 from autopoly_env.arrays import AnyArray
 from autopoly_env.compute import set_threads
 from autopoly_env.errors import ConfigError
+from autopoly_env.workers import no_interrupts
 from training.networks.labelling import SourceConfig, build_trajectory
 from training.networks.samples import LabelConfig, Sample, nfap_sample, turned, warp_sample
 from training.networks.trajectories import Shard, Trajectory
-from training.parallel import no_interrupts
 
 Batch = dict[str, Tensor]
 _HELD_OUT_BATCH = 64
