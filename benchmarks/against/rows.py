@@ -104,7 +104,7 @@ GROUPS: dict[str, Group] = {
         (
             Row("native", "native vector env, 16 envs, two threads: steps a second", "/s"),
             Row("gain", "the same against one env", "x"),
-            Row("workers", "the same in two workers (on threads where there are none): steps a second", "/s"),
+            Row("workers", "the same in two workers: steps a second", "/s"),
             Row("workers gain", "the same against one env", "x"),
         ),
         9,
