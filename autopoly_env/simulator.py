@@ -18,7 +18,7 @@ from autopoly_env.compute import Job, Routine, map_threads, run, run_all
 from autopoly_env.details import Details, hairlines
 from autopoly_env.errors import ConfigError, IllegalActionError, MeshError
 from autopoly_env.guidance import MOST_CORNERS, Guidance, ImportanceSource, importance_settings, weighted
-from autopoly_env.mesh import FaceRule, PolyMesh, broken_faces, check_faces, defects_of, face_rule
+from autopoly_env.mesh import FaceRule, PolyMesh, Topology, broken_faces, check_faces, defects_of, face_rule
 from autopoly_env.mesh.symmetry import mirrored
 from autopoly_env.operators import STOP, Action, Choice, Halfway, Operator, Start, describe, legal_actions, preset
 from autopoly_env.placement import Disagreement, Trial, tried
@@ -174,29 +174,26 @@ class Simulator:
         return self._ended(State(best, self.score(best), n_refits=len(fits)))
 
     def _bounding_boxes(self) -> Iterator[PolyMesh]:
-        target = self._target
-        rows, columns = np.nonzero(target.mask if target.mask.any() else target.coverage > 0.0)
-        if target.weights is not None and target.weights[rows, columns].any():  # of what matters at all
-            matters = target.weights[rows, columns] > 0.0
-            rows, columns = rows[matters], columns[matters]
-        x0, x1 = columns.min() / self.resolution, (columns.max() + 1) / self.resolution
-        y0, y1 = rows.min() / self.resolution, (rows.max() + 1) / self.resolution
+        target, size = self._target, self.resolution
+        filled = target.mask if target.mask.any() else target.coverage > 0.0
+        if target.weights is not None and (filled & (target.weights > 0.0)).any():  # of what matters at all
+            filled = filled & (target.weights > 0.0)
+        rows = np.flatnonzero(filled.any(axis=1))
+        first, last = filled[rows].argmax(axis=1), size - 1 - filled[rows, ::-1].argmax(axis=1)
+        x0, x1, y0, y1 = first.min() / size, (last.max() + 1) / size, rows[0] / size, (rows[-1] + 1) / size
         axis = self.guidance.axis
         if axis is not None:
             half = min(max(0.5 * (x1 - x0), x0 - axis, axis - x1), axis, 1.0 - axis)
-            yield PolyMesh.rectangle(axis - half, y0, axis + half, y1)
+            x0, x1 = axis - half, axis + half
+        yield _quad(np.array(((x0, y0), (x1, y0), (x1, y1), (x0, y1))))
+        if axis is not None:
             return
-        yield PolyMesh.rectangle(x0, y0, x1, y1)
-        at_row_end = (np.diff(rows, prepend=-1) != 0) | (np.diff(rows, append=-1) != 0)  # these have the same hull
-        centres = np.column_stack((columns, rows))[at_row_end] + 0.5
-        if len(centres) == 1:
-            return
-        around = shapely.linestrings(centres / self.resolution).minimum_rotated_rectangle
+        ends = np.column_stack((first, rows, last, rows)).reshape(-1, 2) + 0.5  # of rows, with the hull of all pixels
+        around = shapely.linestrings(ends / size).minimum_rotated_rectangle
         if isinstance(around, shapely.Polygon):
             corners = np.clip(shapely.get_coordinates(around.normalize())[:4], 0.0, 1.0)
-            if not shapely.LinearRing(corners).is_ccw:
-                corners = corners[::-1]
-            yield PolyMesh.from_faces(corners, [(0, 1, 2, 3)])
+            (ax, ay), (bx, by), (cx, cy), _ = corners.tolist()
+            yield _quad(corners if (bx - ax) * (cy - by) > (by - ay) * (cx - bx) else corners[::-1])
 
     def defects_of(self, mesh: PolyMesh) -> tuple[int, int]:
         """(crossings and hairlines, faces that are flipped, empty or against the simulator's rule) of a mesh."""
@@ -481,6 +478,11 @@ class Simulator:
                     mesh = moved
                     break
         return mesh
+
+
+def _quad(corners: FloatArray) -> PolyMesh:
+    """A mesh of one quad, which is known to be sound; `corners` (4, 2)."""
+    return PolyMesh(corners, Topology(4, ((0, 1, 2, 3),)), (0, 1, 2, 3), (0,), 4, 1)
 
 
 def _places_on_border(mesh: PolyMesh, vertex: int) -> Iterator[FloatArray]:
