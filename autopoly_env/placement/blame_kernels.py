@@ -28,11 +28,13 @@ def difference_of(
     for row in range(size):
         for column in range(size):
             difference[row, column] = target[row, column] - min(difference[row, column], 1.0)
-    if len(weights) == 0:
-        labels, n_labels = regions_of(difference, threshold)
-        return difference, labels, n_labels
-    labels, n_labels = regions_of(np.where(weights > 0.0, difference, 0.0), threshold)
-    return difference * weights, labels, n_labels
+            if len(weights) > 0 and not weights[row, column] > 0.0:
+                difference[row, column] = 0.0
+    labels, n_labels = regions_of(difference, threshold)
+    for row in range(len(weights)):
+        for column in range(size):
+            difference[row, column] *= weights[row, column]
+    return difference, labels, n_labels
 
 
 @kernel

@@ -117,3 +117,27 @@ def test_commands__find_everything_compiled_after_it(tmp_path: Path) -> None:
         done = subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True, timeout=900)
         assert done.returncode == 0, done.stderr
         assert ("compiling" in done.stderr) == (line == "autopoly_env.warm"), (line, done.stderr)
+
+
+STEP = """
+import sys
+from autopoly_env.env import AutoPolyEnv
+env = AutoPolyEnv(resolution=32)
+for seed in range(2):
+    _, info = env.reset(seed=seed)
+    for _ in range(3):
+        _, _, terminated, truncated, info = env.step(int(info["action_mask"].nonzero()[0][-1]))
+        if terminated or truncated:
+            break
+print("numba.np.linalg" in sys.modules)
+"""
+
+
+@pytest.mark.slow
+def test_kernels_of_a_step__are_loaded_without_what_numba_needs_of_scipy() -> None:
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    for _ in range(2):  # the first may compile, which imports it
+        said = subprocess.run(
+            [sys.executable, "-c", STEP], env=environment, capture_output=True, text=True, timeout=900
+        )
+    assert said.stdout == "False\n", said.stderr
