@@ -5,6 +5,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+import torch
 
 from agents.rl.config import NetConfig, SpaceSpec
 from agents.rl.network import MeshNet
@@ -50,6 +51,7 @@ def test_records__keep_what_was_measured_and_leave_out_half_a_line(
 
 
 def test_figures__of_an_untrained_policy(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    torch.manual_seed(0)
     net = MeshNet(NetConfig((4, 4, 4), 8, 1), SpaceSpec(max_vertices=24, obs_resolution=32, max_steps=3))
     path = save_policy(tmp_path / "p.safetensors", net, "ppo", {}, {})
     methods = (rl.RECTANGLE, rl.ONE_PASS, rl.PARED, rl.EQUAL)
