@@ -1,6 +1,6 @@
 """Names for the array types that the signatures of this project use."""
 
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,3 +13,10 @@ UIntArray = NDArray[np.uint64]
 BoolArray = NDArray[np.bool_]
 ByteArray = NDArray[np.uint8]
 AnyArray = NDArray[Any]
+_Array = TypeVar("_Array", bound=AnyArray)
+
+
+def read_only(array: _Array) -> _Array:
+    """The array itself, which nobody may write to from now on."""
+    array.flags.writeable = False
+    return array

@@ -4,7 +4,7 @@ import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cache
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from autopoly_env.arguments import is_count
 from autopoly_env.errors import ConfigError
@@ -46,10 +46,11 @@ def set_check(check: Callable[[], None] | None) -> None:
     _check = check
 
 
-def check() -> None:
-    """What was set with `set_check`."""
+def checked(function: Callable[..., _Result], *arguments: Any) -> _Result:
+    """What the function returns, called after what was set with `set_check`."""
     if _check is not None:
         _check()
+    return function(*arguments)
 
 
 @cache
@@ -67,16 +68,11 @@ def map_threads(function: Callable[[_Item], _Result], items: Iterable[_Item]) ->
     Worth it where `function` spends its time in kernels, which run without the GIL: the caller's thread then prepares
     the next item while the others compute.
     """
-
-    def checked(item: _Item) -> _Result:
-        check()
-        return function(item)
-
     if n_threads() == 1:
-        return [checked(item) for item in items]
+        return [checked(function, item) for item in items]
     futures: list[Future[_Result]] = []
     try:
-        futures.extend(_pool(n_threads()).submit(checked, item) for item in items)
+        futures.extend(_pool(n_threads()).submit(checked, function, item) for item in items)
         return [future.result() for future in futures]
     except BaseException:
         for future in futures:

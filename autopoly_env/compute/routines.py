@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from typing import Any, Generic, TypeVar
 
-from autopoly_env.compute.parallel import check, map_threads, n_threads
+from autopoly_env.compute.parallel import checked, map_threads, n_threads
 
 _Result = TypeVar("_Result")
 Job = Callable[[], Any]
@@ -22,15 +22,10 @@ def run(routine: Routine[_Result]) -> _Result:
     try:
         jobs = next(routine)
         while True:
-            jobs = routine.send([_checked(job) for job in jobs])
+            jobs = routine.send([checked(job) for job in jobs])
     except StopIteration as end:
         result: _Result = end.value
         return result
-
-
-def _checked(job: Job) -> Any:
-    check()
-    return job()
 
 
 def run_all(routines: Iterable[Routine[_Result]]) -> list[_Result]:
@@ -135,7 +130,7 @@ class _Crew(Generic[_Result]):
 
     def _do(self, task: _Task) -> None:
         try:
-            task.result = _checked(task.job)
+            task.result = checked(task.job)
         except BaseException as error:
             task.error = error
         self._done.put(task)

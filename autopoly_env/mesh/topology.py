@@ -8,18 +8,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate, chain, pairwise
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
-from autopoly_env.arrays import BoolArray, IntArray
+from autopoly_env.arrays import BoolArray, IntArray, read_only
 from autopoly_env.errors import MeshError
 from autopoly_env.mesh.topology_kernels import PAIRS, Links, packed_links
 
 MANY = 256  # corners of a mesh from which on single elements are looked up without tables of all
 
 Face = tuple[int, ...]
-_Array = TypeVar("_Array", IntArray, BoolArray)
 
 
 class HalfEdges(NamedTuple):
@@ -75,7 +74,7 @@ class Topology:
         packed: IntArray = packed_links(self.corners, self.face_offsets, self.n_vertices)
         if not len(packed):
             raise MeshError(f"a face has a vertex beyond the {self.n_vertices} that there are; give indices from 0")
-        return _read_only(packed)
+        return read_only(packed)
 
     @cached_property
     def arrays(self) -> _Parts:
@@ -146,12 +145,12 @@ class Topology:
     @cached_property
     def corners(self) -> IntArray:
         """(H,) the vertices of all faces, face by face: where each half-edge begins."""
-        return _read_only(np.fromiter(chain.from_iterable(self.faces), np.int64))
+        return read_only(np.fromiter(chain.from_iterable(self.faces), np.int64))
 
     @cached_property
     def face_offsets(self) -> IntArray:
         """(F+1,) the corners of face f are rows face_offsets[f]:face_offsets[f+1] of `half_edges`."""
-        return _read_only(np.fromiter(accumulate(map(len, self.faces), initial=0), np.int64))
+        return read_only(np.fromiter(accumulate(map(len, self.faces), initial=0), np.int64))
 
     @cached_property
     def edges(self) -> IntArray:
@@ -167,7 +166,7 @@ class Topology:
     def edge_faces(self) -> IntArray:
         """(E,2) the one or two faces of each edge, the lower first, -1 where there is no second."""
         sides, owners = self.arrays.sides, self.arrays.owners
-        return _read_only(np.where(sides < 0, -1, owners[sides]))
+        return read_only(np.where(sides < 0, -1, owners[sides]))
 
     @property
     def _boundary(self) -> list[list[int]]:
@@ -183,7 +182,7 @@ class Topology:
         """
         tails = self.boundary_half_edges[:, 0]
         loops = pairwise((0, *self.arrays.loop_ends.tolist()))
-        return tuple(_read_only(tails[begin:end].copy()) for begin, end in loops)
+        return tuple(read_only(tails[begin:end].copy()) for begin, end in loops)
 
     @cached_property
     def boundary_half_edges(self) -> IntArray:
@@ -196,7 +195,7 @@ class Topology:
         part = self._part_of_face()
         faces = self.links.faces
         rows = [(i, part[faces[h]]) for i, loop in enumerate(self._boundary) for h in loop]
-        return _read_only(np.array(rows, np.int64).reshape(-1, 2))
+        return read_only(np.array(rows, np.int64).reshape(-1, 2))
 
     def _part_of_face(self) -> list[int]:
         links, part = self.links, [-1] * self.n_faces
@@ -215,19 +214,19 @@ class Topology:
     @cached_property
     def is_boundary_edge(self) -> BoolArray:
         """(E,) whether the edge has one face."""
-        return _read_only(self.arrays.sides[:, 1] < 0)
+        return read_only(self.arrays.sides[:, 1] < 0)
 
     @cached_property
     def is_boundary_vertex(self) -> BoolArray:
         """(V,) whether the vertex lies on a boundary edge."""
         mask = np.zeros(self.n_vertices, np.bool_)
         mask[self.arrays.outer] = True
-        return _read_only(mask)
+        return read_only(mask)
 
     @cached_property
     def valence(self) -> IntArray:
         """(V,) how many edges meet at each vertex."""
-        return _read_only(np.bincount(self.edges.ravel(), minlength=self.n_vertices))
+        return read_only(np.bincount(self.edges.ravel(), minlength=self.n_vertices))
 
     @cached_property
     def lone_corners(self) -> list[int]:
@@ -295,8 +294,3 @@ def _count_groups(n: int, pairs: Iterable[tuple[int, int]]) -> int:
             parent[a] = b
             n -= 1
     return n
-
-
-def _read_only(array: _Array) -> _Array:
-    array.flags.writeable = False
-    return array

@@ -15,13 +15,12 @@ from autopoly_env.operators.evidence import Blame, Region
 from autopoly_env.placement import blame_kernels
 from autopoly_env.placement.blame_kernels import AREA, DEEP_X, DEEP_Y, MASS
 from autopoly_env.raster import coverage, workspace
+from autopoly_env.raster.raster_kernels import NO_WEIGHTS
 from autopoly_env.silhouette import Silhouette
 
 RESOLUTION = 64  # at which disagreement is looked at
 THRESHOLD = 0.3  # of a pixel's coverage, above which it disagrees
 _MISSING, _EXCESS = 0, 1
-_NO_WEIGHTS = np.empty((0, 0))
-_NO_WEIGHTS.setflags(write=False)
 
 
 class Disagreement:
@@ -35,7 +34,7 @@ class Disagreement:
     def _found(self) -> tuple[FloatArray, IntArray, int]:
         """Only where an operator asks: many actions do not depend on it."""
         target, edges = self._silhouette.target(RESOLUTION), self.mesh.topology.boundary_half_edges
-        weights = _NO_WEIGHTS if target.weights is None else target.weights
+        weights = NO_WEIGHTS if target.weights is None else target.weights
         work = workspace(RESOLUTION, len(edges))
         found: tuple[FloatArray, IntArray, int] = blame_kernels.difference_of(
             self.mesh.vertices, edges, target.coverage, weights, THRESHOLD, work

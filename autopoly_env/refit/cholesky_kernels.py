@@ -16,18 +16,18 @@ class Factor(NamedTuple):
 
 
 @uncounted_kernel
-def _dot(one: FloatArray, i: int, other: FloatArray, j: int, first: int, last: int) -> float:
-    """Of row i of one and row j of another, columns first..last-1; four sums, which a processor adds side by side."""
+def _dot(one: FloatArray, other: FloatArray, first: int, last: int) -> float:
+    """Of two rows (N,), columns first..last-1; four sums, which a processor adds side by side."""
     a, b, c, d = 0.0, 0.0, 0.0, 0.0
     k = first
     while k + 4 <= last:
-        a += one[i, k] * other[j, k]
-        b += one[i, k + 1] * other[j, k + 1]
-        c += one[i, k + 2] * other[j, k + 2]
-        d += one[i, k + 3] * other[j, k + 3]
+        a += one[k] * other[k]
+        b += one[k + 1] * other[k + 1]
+        c += one[k + 2] * other[k + 2]
+        d += one[k + 3] * other[k + 3]
         k += 4
     while k < last:
-        a += one[i, k] * other[j, k]
+        a += one[k] * other[k]
         k += 1
     return (a + b) + (c + d)
 
@@ -43,9 +43,9 @@ def factorise(factor: Factor, relative: float, absolute: float) -> bool:
             j += 1
         first[i] = j
         for j in range(first[i], i):
-            total = matrix[i, j] - _dot(matrix, i, matrix, j, max(first[i], first[j]), j)
+            total = matrix[i, j] - _dot(matrix[i], matrix[j], max(first[i], first[j]), j)
             matrix[i, j] = total / matrix[j, j]
-        total = matrix[i, i] - _dot(matrix, i, matrix, i, first[i], i)
+        total = matrix[i, i] - _dot(matrix[i], matrix[i], first[i], i)
         if not total > 0.0:
             return False
         matrix[i, i] = np.sqrt(total)
@@ -57,18 +57,7 @@ def solve(factor: Factor, vector: FloatArray) -> None:
     """Put the solution x of A x = `vector` (N,) in its place."""
     matrix, first = factor
     for i in range(vector.shape[0]):
-        a, b, c, d = 0.0, 0.0, 0.0, 0.0  # as in `_dot`
-        k = first[i]
-        while k + 4 <= i:
-            a += matrix[i, k] * vector[k]
-            b += matrix[i, k + 1] * vector[k + 1]
-            c += matrix[i, k + 2] * vector[k + 2]
-            d += matrix[i, k + 3] * vector[k + 3]
-            k += 4
-        while k < i:
-            a += matrix[i, k] * vector[k]
-            k += 1
-        vector[i] = (vector[i] - ((a + b) + (c + d))) / matrix[i, i]
+        vector[i] = (vector[i] - _dot(matrix[i], vector, first[i], i)) / matrix[i, i]
     for i in range(vector.shape[0] - 1, -1, -1):
         vector[i] /= matrix[i, i]
         for k in range(first[i], i):

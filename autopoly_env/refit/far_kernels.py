@@ -45,7 +45,6 @@ def far_phase(
                 move = rate * mean[v, axis] / (1.0 - mean_left)
                 move /= np.sqrt(square[v, axis] / (1.0 - square_left)) + floor
                 unknowns[v, axis] = min(max(unknowns[v, axis] - move, low), high)
-        if shape.rule.triples.shape[0] > 0:
-            hold(shape.rule, unknowns, low, high)
+        hold(shape.rule, unknowns, low, high)
         obey(shape.ties, shape.boundary, best, unknowns)
         rate *= decay

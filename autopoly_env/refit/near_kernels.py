@@ -168,8 +168,7 @@ def _stride(
     for v in range(unknowns.shape[0]):
         candidate[v, 0] = min(max(unknowns[v, 0] + length * move[2 * v], low), high)
         candidate[v, 1] = min(max(unknowns[v, 1] + length * move[2 * v + 1], low), high)
-    if shape.rule.triples.shape[0] > 0:
-        hold(shape.rule, candidate, low, high)
+    hold(shape.rule, candidate, low, high)
     obey(shape.ties, shape.boundary, best, candidate)
 
 
@@ -226,8 +225,7 @@ def damped_gradient(
     size = picture.coverage.shape[0]
     loss = half_gradient(unknowns, shape.loops, picture, work, gradient)
     loss += _stretching(origin, unknowns, shape, stiffness, size, gradient)
-    if shape.rule.triples.shape[0] > 0:
-        loss += hinge(shape.rule, origin, unknowns, size, gradient, gradient[:0])
+    loss += hinge(shape.rule, origin, unknowns, size, gradient, gradient[:0])
     tie_gradient(shape.ties, gradient)
     return loss
 
@@ -249,8 +247,7 @@ def damped_equations(
             normal[2 * i + axis, 2 * i + axis] += stiffness
             normal[2 * j + axis, 2 * j + axis] += stiffness
             normal[2 * max(i, j) + axis, 2 * min(i, j) + axis] -= stiffness
-    if shape.rule.triples.shape[0] > 0:
-        loss += hinge(shape.rule, origin, unknowns, size, gradient, normal)
+    loss += hinge(shape.rule, origin, unknowns, size, gradient, normal)
     tie_gradient(shape.ties, gradient)
     tie_normal(shape.ties, normal)
     return loss

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from autopoly_env.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from autopoly_env.arrays import BoolArray, FloatArray, IntArray, read_only
 from autopoly_env.errors import MeshError
 from autopoly_env.mesh import ASKED_TURN, FaceRule, PolyMesh, Topology
 from autopoly_env.raster import workspace
@@ -33,8 +33,7 @@ from autopoly_env.refit.rule_kernels import FREE, LOCKED
 from autopoly_env.refit.shape_kernels import Settings
 from autopoly_env.silhouette import WEIGHT_STEPS, Silhouette, Target
 
-_NOTHING = np.empty(0, np.int64)
-_NOTHING.setflags(write=False)
+_NOTHING = read_only(np.empty(0, np.int64))
 
 
 @dataclass(frozen=True)
@@ -93,9 +92,9 @@ class RefitTarget:
         """Four targets, coarse to fine."""
         weights = [level.weights.ravel() for level in levels if level.weights is not None]
         return _weighing(
-            _read_only(np.array([level.resolution for level in levels])),
-            _read_only(np.concatenate([level.coverage.ravel() for level in levels])),
-            _read_only(np.concatenate([*weights, np.empty(0)])),
+            read_only(np.array([level.resolution for level in levels])),
+            read_only(np.concatenate([level.coverage.ravel() for level in levels])),
+            read_only(np.concatenate([*weights, np.empty(0)])),
             background,
         )
 
@@ -116,7 +115,7 @@ class RefitTarget:
 
 def _weighing(sizes: IntArray, coverages: FloatArray, weights: FloatArray, background: float) -> RefitTarget:
     sums = packed_sums(sizes, coverages, weights, float(background), float(WEIGHT_STEPS))
-    return RefitTarget(sizes, coverages, weights, _read_only(sums))
+    return RefitTarget(sizes, coverages, weights, read_only(sums))
 
 
 def quick_resolution(resolution: int) -> int:
@@ -234,6 +233,7 @@ def _free(topology: Topology) -> _Bound:
     return _Bound(arrays.outer, arrays.inner, arrays.neighbours, arrays.neighbour_offsets)
 
 
+@lru_cache(maxsize=4096)
 def _ruled(topology: Topology) -> _Bound:
     """All vertices as unknowns, first those of the boundary, and their corners bound to turn."""
     arrays = topology.arrays
@@ -261,9 +261,4 @@ def _packed_rule(topology: Topology) -> IntArray:
 def _packed(bound: _Bound) -> IntArray:
     """The parts in one array, which begins with where each of them begins, and the last one ends."""
     lengths = [len(bound) + 1, *map(len, bound)]
-    return _read_only(np.concatenate((np.cumsum(lengths), *bound)))
-
-
-def _read_only(array: AnyArray) -> AnyArray:
-    array.setflags(write=False)
-    return array
+    return read_only(np.concatenate((np.cumsum(lengths), *bound)))

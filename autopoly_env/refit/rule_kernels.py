@@ -29,7 +29,7 @@ class Rule(NamedTuple):
     asked: float  # the sine by which every corner should turn
 
 
-@kernel
+@uncounted_kernel
 def hinge(
     rule: Rule, origin: FloatArray, unknowns: FloatArray, size: int, gradient: FloatArray, normal: FloatArray
 ) -> float:
@@ -38,6 +38,15 @@ def hinge(
     Adds half the gradient J'r to `gradient` (N, 2) and J'J to the lower triangle of `normal` (2N, 2N), both per pixel;
     an empty `normal` is left alone.
     """
+    if rule.triples.shape[0] == 0:
+        return 0.0
+    return _hinge(rule, origin, unknowns, size, gradient, normal)
+
+
+@kernel
+def _hinge(
+    rule: Rule, origin: FloatArray, unknowns: FloatArray, size: int, gradient: FloatArray, normal: FloatArray
+) -> float:
     loss = 0.0
     slope = np.empty(6)
     for c in range(rule.triples.shape[0]):
@@ -92,12 +101,18 @@ def _following(
     return loss
 
 
-@kernel
+@uncounted_kernel
 def hold(rule: Rule, unknowns: FloatArray, low: float, high: float) -> None:
     """Move each corner that turns too little, and those beside it, by the least that makes it turn, inside the box.
 
     One corner after the other, in sweeps, as position-based dynamics do (Müller et al. 2007).
     """
+    if rule.triples.shape[0] > 0:
+        _hold(rule, unknowns, low, high)
+
+
+@kernel
+def _hold(rule: Rule, unknowns: FloatArray, low: float, high: float) -> None:
     slope = np.empty((3, 2))
     for _sweep in range(_SWEEPS):
         n_short = 0

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from autopoly_env.arguments import whole
-from autopoly_env.arrays import AnyArray, BoolArray, FloatArray
+from autopoly_env.arrays import AnyArray, BoolArray, FloatArray, read_only
 from autopoly_env.errors import SilhouetteError
 from autopoly_env.silhouette import cleaning, object_mask, target_kernels
 from autopoly_env.silhouette.connectivity import is_slanting_line
@@ -21,8 +21,7 @@ __all__ = ["SMALL", "ImageSource", "Silhouette", "Target", "find_images", "load_
 
 WEIGHT_STEPS = 2**20  # of a weight of 1
 MOST_RESOLUTION = 4096  # of a target
-_NO_WEIGHTS = np.empty((0, 0))
-_NO_WEIGHTS.setflags(write=False)
+_NO_WEIGHTS = read_only(np.empty((0, 0)))
 SMALL = 64  # pixels a side; a smaller picture has too few pixels to tell shapes apart by counting them
 
 
@@ -60,8 +59,8 @@ class Target:
         coverage = np.array(self.coverage, dtype=np.float64, order="C")
         if coverage.ndim != 2 or coverage.shape[0] != coverage.shape[1] or coverage.size == 0:
             raise SilhouetteError(f"coverage has shape {coverage.shape}; expected a square (R, R): pad it")
-        coverage = _read_only(coverage)  # before kernels see it, which take what is writable for another type
-        weights = None if self.weights is None else _read_only(np.rint(self.weights * WEIGHT_STEPS) / WEIGHT_STEPS)
+        coverage = read_only(coverage)  # before kernels see it, which take what is writable for another type
+        weights = None if self.weights is None else read_only(np.rint(self.weights * WEIGHT_STEPS) / WEIGHT_STEPS)
         among = _NO_WEIGHTS if weights is None else weights
         row_sum, row_square_sum, weight_sum = target_kernels.row_sums(coverage, among)
         mask, mask_sum, n_filled = target_kernels.filled_sums(coverage, among)
@@ -71,7 +70,7 @@ class Target:
 
     def _set(self, **arrays: AnyArray | None) -> None:
         for name, array in arrays.items():
-            object.__setattr__(self, name, None if array is None else _read_only(array))
+            object.__setattr__(self, name, None if array is None else read_only(array))
 
     @property
     def resolution(self) -> int:
@@ -111,7 +110,7 @@ class Silhouette:
             raise SilhouetteError(f"{given}; expected (R, R) and bool: use load_silhouette for other images")
         if not mask.any():
             raise SilhouetteError("the mask is False everywhere: there is no object; expected some True pixels")
-        object.__setattr__(self, "mask", _read_only(mask))
+        object.__setattr__(self, "mask", read_only(mask))
 
     @property
     def resolution(self) -> int:
@@ -205,8 +204,3 @@ def area_means(values: FloatArray, shape: tuple[int, int]) -> FloatArray:
         begun = values.take(np.minimum(whole, size - 1), axis) * np.expand_dims(rest / n, 1 - axis)
         values = np.diff(prefix.take(whole, axis) + begun, axis=axis) * (n / size)
     return values
-
-
-def _read_only(array: AnyArray) -> AnyArray:
-    array.setflags(write=False)
-    return array
