@@ -5,6 +5,8 @@ import numpy as np
 from autopoly_env.arrays import FloatArray, IntArray
 from autopoly_env.compute import kernel, uncounted_kernel
 
+LEAST_TURN = 0.005  # sine, 0.29 degrees, at every corner of a face that keeps a rule of faces
+
 
 @uncounted_kernel
 def turn(points: FloatArray, before: int, at: int, after: int) -> float:
@@ -25,6 +27,20 @@ def turns(points: FloatArray, corners: IntArray, offsets: IntArray) -> FloatArra
             before, after = corners[k - 1 if k > first else last - 1], corners[k + 1 if k + 1 < last else first]
             sines[k] = turn(points, before, corners[k], after)
     return sines
+
+
+@uncounted_kernel
+def n_flat_faces(points: FloatArray, corners: IntArray, offsets: IntArray, least: float) -> int:
+    """How many faces have a corner that does not turn by a sine of at least `least`."""
+    n_flat = 0
+    for face in range(offsets.shape[0] - 1):
+        first, last = offsets[face], offsets[face + 1]
+        for k in range(first, last):
+            before, after = corners[k - 1 if k > first else last - 1], corners[k + 1 if k + 1 < last else first]
+            if not turn(points, before, corners[k], after) >= least:
+                n_flat += 1
+                break
+    return n_flat
 
 
 @uncounted_kernel

@@ -11,12 +11,12 @@ import numpy as np
 
 from autopoly_env.errors import ConfigError, MeshError
 from autopoly_env.mesh import corner_kernels
+from autopoly_env.mesh.corner_kernels import LEAST_TURN
 from autopoly_env.mesh.polymesh import PolyMesh
 from autopoly_env.mesh.topology import Topology
 
 FaceRule = Literal["any", "convex", "quads"]
 FACE_RULES: tuple[FaceRule, ...] = get_args(FaceRule)
-LEAST_TURN = 0.005  # sine, 0.29 degrees, at every corner of a face that keeps the rule
 ASKED_TURN = 0.01  # what a refit and what is placed go for, so that they keep clear of it
 MOST_CORNERS = 4  # of a face, under "quads"
 

@@ -87,12 +87,18 @@ class PolyMesh:
         faces = [(c, c + 1, c + n + 2, c + n + 1) for c in corners]
         return cls.from_faces(np.column_stack((columns.ravel(), rows.ravel())), faces)
 
-    def with_vertices(self, vertices: npt.ArrayLike) -> "PolyMesh":
-        """The same mesh with its vertices (V,2) elsewhere; the topology is shared, all it derives too."""
+    def with_vertices(self, vertices: npt.ArrayLike, defects: Defects | None = None) -> "PolyMesh":
+        """The same mesh with its vertices (V,2) elsewhere; the topology is shared, all it derives too.
+
+        `defects` are those of the new mesh, where they are known already.
+        """
         points = np.asarray(vertices, np.float64)
         if points.shape != self.vertices.shape:
             raise MeshError(f"new vertices have shape {points.shape}; give {self.vertices.shape}, one row per vertex")
-        return PolyMesh(points, self.topology, self.vertex_ids, self.face_ids, self.next_vertex_id, self.next_face_id)
+        made = PolyMesh(points, self.topology, self.vertex_ids, self.face_ids, self.next_vertex_id, self.next_face_id)
+        if defects is not None:
+            made.__dict__["defects"] = defects
+        return made
 
     @property
     def faces(self) -> tuple[Face, ...]:

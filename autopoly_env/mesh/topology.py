@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate, chain, pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -54,12 +54,39 @@ class _Parts:
         return part
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Topology:
     """The faces of a mesh as cycles of vertex indices, wound alike. Derived arrays are read-only."""
 
     n_vertices: int
     faces: tuple[Face, ...]
+
+    @classmethod
+    def of_packed(cls, n_vertices: int, packed: IntArray) -> "Topology":
+        """The topology that a kernel has made; its `faces` are found when they are asked for."""
+        made = object.__new__(cls)
+        made.__dict__.update(n_vertices=n_vertices, packed=read_only(packed))
+        return made
+
+    def __getattr__(self, name: str) -> Any:
+        if name != "faces" or "packed" not in self.__dict__:
+            raise AttributeError(f"a Topology has no {name!r}")
+        corners, ends = self.corners.tolist(), self.face_offsets.tolist()
+        faces = tuple(map(tuple, map(corners.__getitem__, map(slice, ends, ends[1:]))))
+        self.__dict__["faces"] = faces
+        return faces
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Topology):
+            return NotImplemented
+        return self.n_vertices == other.n_vertices and self._key == other._key
+
+    def __hash__(self) -> int:
+        return hash((self.n_vertices, self._key))
+
+    @cached_property
+    def _key(self) -> tuple[bytes, bytes]:
+        return self.corners.tobytes(), self.face_offsets.tobytes()
 
     def __reduce__(self) -> tuple[type["Topology"], tuple[object, ...]]:
         """Pickled without what is derived from it."""
@@ -145,11 +172,15 @@ class Topology:
     @cached_property
     def corners(self) -> IntArray:
         """(H,) the vertices of all faces, face by face: where each half-edge begins."""
+        if "packed" in self.__dict__:
+            return self.arrays.corners
         return read_only(np.fromiter(chain.from_iterable(self.faces), np.int64))
 
     @cached_property
     def face_offsets(self) -> IntArray:
         """(F+1,) the corners of face f are rows face_offsets[f]:face_offsets[f+1] of `half_edges`."""
+        if "packed" in self.__dict__:
+            return self.arrays.offsets
         return read_only(np.fromiter(accumulate(map(len, self.faces), initial=0), np.int64))
 
     @cached_property
@@ -248,11 +279,11 @@ class Topology:
     @cached_property
     def n_corners(self) -> int:
         """H, of which every face has as many as vertices."""
-        return sum(map(len, self.faces))
+        return len(self.corners)
 
     @property
     def n_faces(self) -> int:
-        return len(self.faces)
+        return len(self.face_offsets) - 1
 
     @cached_property
     def n_components(self) -> int:

@@ -2,16 +2,8 @@
 
 from autopoly_env.operators.action import STOP, Action, Choice, Halfway, Start
 from autopoly_env.operators.codec import ActionCodec, describe, legal_actions
-from autopoly_env.operators.elements import (
-    CAPACITY_PER_VERTEX,
-    CORNER,
-    EDGE,
-    FACE,
-    HOLE,
-    HOLE_SIDES,
-    VERTEX,
-    ElementKind,
-)
+from autopoly_env.operators.elements import CAPACITY_PER_VERTEX, CORNER, EDGE, FACE, HOLE, VERTEX, ElementKind
+from autopoly_env.operators.hole_kernels import HOLE_SIDES
 from autopoly_env.operators.holes import HoleChoice, plan_hole
 from autopoly_env.operators.operator import Operator
 from autopoly_env.operators.registry import OPERATORS, PRESETS, operator_named, preset, register

@@ -10,8 +10,10 @@ import numpy as np
 from autopoly_env.arrays import BoolArray
 from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.mesh import PolyMesh
+from autopoly_env.operators import mask_kernels
 from autopoly_env.operators.action import STOP, Action
 from autopoly_env.operators.elements import CAPACITY_PER_VERTEX
+from autopoly_env.operators.masks import legal_masks, rule_of, table_of
 from autopoly_env.operators.operator import Operator
 from autopoly_env.operators.registry import operator_named, preset
 
@@ -40,6 +42,10 @@ class ActionCodec:
             self._start[operator.name] = self.n_actions
             self.n_actions += self._capacity(operator)
         self._names, self._starts = tuple(self._start), tuple(self._start.values())
+        known = [operator for operator in map(operator_named, operators) if rule_of(operator) >= 0]
+        self._others = [name for name in self._names if name not in {operator.name for operator in known}]
+        self._table = table_of(known, [self._start[op.name] for op in known], list(map(self._capacity, known)))
+        self._most = np.array([CAPACITY_PER_VERTEX[kind] * max_vertices for kind in _COUNTED])
 
     def __getstate__(self) -> dict[str, Any]:
         return {**vars(self), "operators": tuple(map(operator_named, self.operators))}
@@ -81,10 +87,10 @@ class ActionCodec:
         """(n_actions,) the actions that the mesh allows and that stay within the capacities; STOP always."""
         mask = np.zeros(self.n_actions, np.bool_)
         mask[0] = True
-        counts, limits = mesh.counts, [CAPACITY_PER_VERTEX[kind] * self.max_vertices for kind in _COUNTED]
-        for name, start in self._start.items():
-            operator = operator_named(name)
-            legal, capacity = _within_capacity(operator, mesh, counts, limits), self._capacity(operator)
+        mask_kernels.legal(mesh.vertices, mesh.topology.packed, self._table, self._most, mask)
+        for name in self._others:
+            operator, start = operator_named(name), self._start[name]
+            legal, capacity = _within_capacity(operator, mesh, self._most.tolist()), self._capacity(operator)
             if len(legal) > capacity:
                 legal = legal[:capacity]
             mask[start : start + len(legal)] = legal
@@ -103,9 +109,9 @@ class ActionCodec:
         return operator.element.per_vertex * self.max_vertices
 
 
-def _within_capacity(operator: Operator, mesh: PolyMesh, counts: Sequence[int], limits: Sequence[int]) -> BoolArray:
-    """The operator's mask, less what would take (V, E, F), which are `counts`, beyond the limits."""
-    legal = operator.legal_mask(mesh)
+def _within_capacity(operator: Operator, mesh: PolyMesh, limits: Sequence[int]) -> BoolArray:
+    """The operator's mask, less what would take (V, E, F) beyond the limits."""
+    legal, counts = operator.legal_mask(mesh), mesh.counts
     if operator.varies is not None:
         changes = [operator.change_at(mesh, element) for element in np.flatnonzero(legal).tolist()]
         if not all(_fits(counts, change, limits) for change in changes):
@@ -129,8 +135,8 @@ def legal_actions(mesh: PolyMesh, operators: Iterable[str]) -> list[Action]:
     """Every action of the named operators that the mesh allows; without capacities, and without STOP."""
     return [
         Action(operator.name, element)
-        for operator in map(operator_named, operators)
-        for element in np.flatnonzero(operator.legal_mask(mesh)).tolist()
+        for operator, mask in legal_masks(mesh, tuple(map(operator_named, operators)))
+        for element in np.flatnonzero(mask).tolist()
     ]
 
 

@@ -10,7 +10,8 @@ from autopoly_env.mesh import PolyMesh, mirrored
 from autopoly_env.mesh.planar_kernels import clear_extrusion
 from autopoly_env.operators.action import Choice, Start
 from autopoly_env.operators.deeds import NOTHING, Deed, Press, Pull, select
-from autopoly_env.operators.edge_extrude import INSET, MAX_HALVINGS, boundary_edges
+from autopoly_env.operators.edge_extrude import boundary_edges
+from autopoly_env.operators.edit_kernels import INSET, MAX_HALVINGS
 from autopoly_env.operators.elements import EDGE
 from autopoly_env.operators.evidence import Evidence, missing_mass, sane_move
 from autopoly_env.operators.mirroring import again, moved

@@ -2,10 +2,9 @@
 
 from typing import Any
 
-import numpy as np
-
 from autopoly_env.arrays import BoolArray
 from autopoly_env.mesh import PolyMesh
+from autopoly_env.operators import edit_kernels
 from autopoly_env.operators.action import Choice
 from autopoly_env.operators.deeds import Press, select
 from autopoly_env.operators.elements import EDGE
@@ -16,7 +15,8 @@ from autopoly_env.operators.wording import Gesture, Phrases, begun_with
 
 def dissolvable_edges(mesh: PolyMesh) -> BoolArray:
     """(E,) the edges between two faces that share nothing else."""
-    return np.array([_defect(mesh, e) is None for e in range(mesh.topology.n_edges)], np.bool_)
+    mask: BoolArray = edit_kernels.joinable(mesh.topology.packed)
+    return mask
 
 
 def _defect(mesh: PolyMesh, edge: int) -> str | None:

@@ -7,7 +7,7 @@ import numpy as np
 
 from autopoly_env.arrays import BoolArray, FloatArray
 from autopoly_env.mesh import PolyMesh, mirrored
-from autopoly_env.mesh.planar_kernels import clear_extrusion
+from autopoly_env.operators import edit_kernels
 from autopoly_env.operators.action import Choice, Start
 from autopoly_env.operators.deeds import Pull, select
 from autopoly_env.operators.elements import EDGE
@@ -17,9 +17,6 @@ from autopoly_env.operators.operator import Mirroring, Operator
 from autopoly_env.operators.rebuilding import ends_along_face, grown, refusal
 from autopoly_env.operators.wording import Gesture, Phrases, begun_with
 
-OFFSET = 0.25  # of the edge's length
-INSET = 0.25
-MAX_HALVINGS = 12
 _LEAST_WIDTH = 0.1  # of the edge's length, of an extrusion that is stretched to what is missing
 
 
@@ -31,18 +28,13 @@ def boundary_edges(mesh: PolyMesh) -> BoolArray:
 def extrude(mesh: PolyMesh, edge: int, _choice: Choice | None) -> PolyMesh:
     """A new quad (b, a, a', b') outside boundary edge a-b. Its far side is parallel to a-b.
 
-    It stands off by `OFFSET` of the edge's length, halved up to `MAX_HALVINGS` times while the quad meets another edge
-    of the mesh, be it straight or narrowed by `INSET` of the edge's length at either end.
+    Where it begins `edit_kernels.extrusion` says.
     """
     if mesh.topology.sides(edge)[1] >= 0:
         raise refusal("edge_extrude", "edge", edge, "it lies between two faces; choose a boundary edge")
-    (a, b), new = ends_along_face(mesh, edge), len(mesh.vertex_ids)
-    offset, inset = clear_extrusion(mesh.vertices, mesh.edges, a, b, OFFSET, INSET, MAX_HALVINGS)
-    (ax, ay), (bx, by) = mesh.vertices[[a, b]].tolist()
-    in_x, in_y = inset * (bx - ax), inset * (by - ay)
-    out_x, out_y = offset * (by - ay), offset * (ax - bx)
-    points = ((ax + in_x + out_x, ay + in_y + out_y), (bx - in_x + out_x, by - in_y + out_y))
-    return grown(mesh, points, (*mesh.faces, (b, a, new, new + 1)), 1)
+    a, b = ends_along_face(mesh, edge)
+    points = np.array(edit_kernels.extrusion(mesh.vertices, mesh.edges, a, b)).reshape(2, 2)
+    return grown(mesh, points, edit_kernels.extruded(mesh.topology.packed, len(mesh.vertex_ids), edge), 1)
 
 
 def _begin(evidence: Evidence, edge: int) -> Iterator[Start]:

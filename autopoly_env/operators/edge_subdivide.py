@@ -7,13 +7,14 @@ import numpy as np
 
 from autopoly_env.arrays import BoolArray, FloatArray
 from autopoly_env.mesh import PolyMesh, mirrored
+from autopoly_env.operators import edit_kernels
 from autopoly_env.operators.action import Choice, Start
 from autopoly_env.operators.deeds import Deed, Press, select
 from autopoly_env.operators.elements import EDGE
 from autopoly_env.operators.evidence import Evidence, sane_move
 from autopoly_env.operators.mirroring import again, moved
 from autopoly_env.operators.operator import Mirroring, Operator
-from autopoly_env.operators.rebuilding import corner_of, ends_along_face, grown
+from autopoly_env.operators.rebuilding import ends_along_face, grown
 from autopoly_env.operators.wording import Gesture, Phrases, Told, begun_with
 
 
@@ -24,12 +25,7 @@ def any_edge(mesh: PolyMesh) -> BoolArray:
 
 def subdivide(mesh: PolyMesh, edge: int, _choice: Choice | None) -> PolyMesh:
     """A new vertex at the midpoint of the edge; the faces beside it keep their other corners."""
-    new = len(mesh.vertex_ids)
-    faces = list(mesh.faces)
-    for h in mesh.topology.sides(edge):
-        if h >= 0:
-            f, i = corner_of(mesh, h)
-            faces[f] = (*faces[f][: i + 1], new, *faces[f][i + 1 :])
+    faces = edit_kernels.subdivided(mesh.topology.packed, len(mesh.vertex_ids), edge)
     return grown(mesh, _middle(mesh, edge)[None], faces)
 
 

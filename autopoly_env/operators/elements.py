@@ -10,10 +10,10 @@ from functools import cached_property
 
 from autopoly_env.errors import SequenceError
 from autopoly_env.mesh import PolyMesh
+from autopoly_env.operators.hole_kernels import HOLE_SIDES
 from autopoly_env.shown import short
 
 ElementIds = dict[str, int | list[int]]  # {"edge": [3, 7]}, {"face": 0, "vertex": 2}, ...: what JSON knows
-HOLE_SIDES = (3, 4)
 
 
 @dataclass(frozen=True)

@@ -8,19 +8,19 @@ import numpy as np
 from autopoly_env.arrays import BoolArray, FloatArray
 from autopoly_env.errors import IllegalActionError
 from autopoly_env.mesh import PolyMesh, mirrored
+from autopoly_env.operators import edit_kernels
 from autopoly_env.operators.action import Choice, Start
 from autopoly_env.operators.choices import OF_HOLE
 from autopoly_env.operators.deeds import NO_FACE, NOTHING, Cut, Deed, Press, select
-from autopoly_env.operators.elements import HOLE, HOLE_SIDES, hole_face
+from autopoly_env.operators.elements import HOLE, hole_face
 from autopoly_env.operators.evidence import Evidence, Region
-from autopoly_env.operators.hole_kernels import roomy_faces
+from autopoly_env.operators.hole_kernels import HOLE_SIDES, TINY_AREA, roomy_faces
 from autopoly_env.operators.holes import HoleChoice, default_hole, hole_defect, plan_hole
 from autopoly_env.operators.mirroring import again
 from autopoly_env.operators.operator import Mirroring, Operator
 from autopoly_env.operators.rebuilding import corners_from_last, grown, refusal
 from autopoly_env.operators.wording import Gesture, Phrases, Told
 
-TINY_AREA = 1e-6  # unit square; 1/16 of a pixel at 256 x 256
 _RIM_PROMISE = 0.1  # of an excess that an edge answers for, left to a hole
 _MIRROR_SCALES = (1.0, 0.6)  # of a hole on the axis, tried until it fits
 _BOX = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
@@ -53,17 +53,9 @@ def cut(mesh: PolyMesh, element: int, choice: Choice | None) -> PolyMesh:
     defect = hole_defect(mesh.vertices[list(face)], choice)
     if defect is not None:
         raise refusal("face_hole", "hole", element, f"{defect}; give points and bridges from plan_hole")
-    (i, h), (j, k) = sorted(choice.bridges)
-    new = len(mesh.vertex_ids)
-    faces = list(mesh.faces)
-    faces[f] = (*face[: i + 1], *_backwards(new, n_sides, h, k), *face[j:])
-    part = (*face[i : j + 1], *_backwards(new, n_sides, k, h))
-    return grown(mesh, choice.points, (*faces, part), 1)
-
-
-def _backwards(first: int, n: int, start: int, end: int) -> list[int]:
-    """The hole's vertex indices from corner `start` down to `end`, against its winding."""
-    return [first + (start - step) % n for step in range((start - end) % n + 1)]
+    bridges = np.array(sorted(choice.bridges)).ravel()
+    packed = edit_kernels.holed(mesh.topology.packed, len(mesh.vertex_ids), f, n_sides, bridges)
+    return grown(mesh, choice.points, packed, 1)
 
 
 # --- where it starts

@@ -11,7 +11,7 @@ from autopoly_env.operators.action import Choice, Start
 from autopoly_env.operators.deeds import Press, select
 from autopoly_env.operators.elements import FACE
 from autopoly_env.operators.evidence import Evidence, sane_move
-from autopoly_env.operators.face_hole import TINY_AREA
+from autopoly_env.operators.hole_kernels import TINY_AREA
 from autopoly_env.operators.operator import Operator
 from autopoly_env.operators.rebuilding import grown, refusal
 from autopoly_env.operators.wording import Gesture, Phrases, begun_with

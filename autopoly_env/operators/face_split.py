@@ -7,6 +7,7 @@ import numpy as np
 from autopoly_env.arrays import BoolArray, FloatArray
 from autopoly_env.mesh import Face, PolyMesh
 from autopoly_env.mesh.planar_kernels import is_free_diagonal, split_imbalance, splittable_corners
+from autopoly_env.operators import edit_kernels
 from autopoly_env.operators.action import Choice
 from autopoly_env.operators.choices import TO_CORNER
 from autopoly_env.operators.deeds import Press, select
@@ -62,10 +63,7 @@ def split(mesh: PolyMesh, corner: int, choice: Choice | None) -> PolyMesh:
             corner,
             f"the way to corner {choice} is no free diagonal of its face; choose another",
         )
-    i, j = min(i, j), max(i, j)
-    faces = list(mesh.faces)
-    faces[f] = (*face[: i + 1], *face[j:])
-    return grown(mesh, (), (*faces, face[i : j + 1]), 1)
+    return grown(mesh, (), edit_kernels.split(mesh.topology.packed, len(mesh.vertex_ids), corner, int(choice)), 1)
 
 
 def _inner(_mesh: PolyMesh, _corner: int) -> bool:

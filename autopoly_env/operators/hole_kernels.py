@@ -17,6 +17,10 @@ from autopoly_env.mesh.planar_kernels import (
     segments_touch,
 )
 
+HOLE_SIDES = (3, 4)  # corners that a hole may have
+TINY_AREA = 1e-6  # unit square, of a face that has no room for one; 1/16 of a pixel at 256 x 256
+BALANCE_WEIGHT = 0.25  # what a wholly one-sided cut costs, in lengths of the square root of the face's area
+
 
 @kernel
 def _contains(ring: FloatArray, x: float, y: float) -> bool:
@@ -133,3 +137,38 @@ def best_bridges(
             ):
                 best_cost, best = cost, (c, b)
     return best
+
+
+@kernel
+def plan_bridges(face: FloatArray, hole: FloatArray, bridges: IntArray) -> bool:
+    """Write the best pair of bridges to `bridges` (4,), by the first's position in the face; whether there is one.
+
+    Not so where the hole (k, 2) does not lie inside of the face (n, 2), or either is no simple ring.
+    """
+    if not (is_simple_ring(hole) and is_simple_ring(face) and is_ring_inside(hole, face)):
+        return False
+    return bridges_among(face, hole, free_bridges(face, hole, np.empty((0, 4))), bridges)
+
+
+@kernel
+def bridges_among(face: FloatArray, hole: FloatArray, free: BoolArray, bridges: IntArray) -> bool:
+    """`plan_bridges` of a mask (n, k) of those that are free."""
+    rows, lengths, n = np.empty((free.size, 2), np.int64), np.empty(free.size), 0
+    for f in range(len(face)):
+        for h in range(len(hole)):
+            if free[f, h]:
+                x, y = face[f, 0] - hole[h, 0], face[f, 1] - hole[h, 1]
+                length, k = np.sqrt(x * x + y * y), n
+                while k > 0 and lengths[k - 1] > length:
+                    lengths[k], rows[k, 0], rows[k, 1] = lengths[k - 1], rows[k - 1, 0], rows[k - 1, 1]
+                    k -= 1
+                lengths[k], rows[k, 0], rows[k, 1] = length, f, h
+                n += 1
+    scale = 1.0 / np.sqrt(arc_area(face, 0, len(face) - 1))
+    b, c = best_bridges(face, hole, rows[:n], scale * lengths[:n], BALANCE_WEIGHT)
+    if b < 0:
+        return False
+    if rows[b, 0] > rows[c, 0]:
+        b, c = c, b
+    bridges[0], bridges[1], bridges[2], bridges[3] = rows[b, 0], rows[b, 1], rows[c, 0], rows[c, 1]
+    return True

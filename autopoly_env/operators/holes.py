@@ -11,18 +11,17 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from autopoly_env.arrays import FloatArray, IntArray
+from autopoly_env.arrays import FloatArray
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.mesh.planar_kernels import arc_area, segments_touch
+from autopoly_env.mesh.planar_kernels import segments_touch
 from autopoly_env.operators.hole_kernels import (
-    best_bridges,
+    bridges_among,
     free_bridges,
     is_free_bridge,
     is_ring_inside,
     is_simple_ring,
 )
 
-BALANCE_WEIGHT = 0.25  # what a wholly one-sided cut costs, in lengths of the square root of the face's area
 Bridge = tuple[int, int]
 
 
@@ -50,10 +49,11 @@ def plan_hole(
         return None
     walls = [np.hstack((rim, np.roll(rim, -1, axis=0))) for rim in (np.asarray(o, np.float64) for o in obstacles)]
     free = free_bridges(ring, hole, np.vstack(walls) if walls else np.empty((0, 4)))
-    bridges = _best_pair(ring, hole, np.argwhere(free))
-    if bridges is None:
+    ends = np.empty(4, np.int64)
+    if not bridges_among(ring, hole, free, ends):
         return None
-    return HoleChoice(tuple((float(x), float(y)) for x, y in hole), bridges)
+    f, h, g, i = ends.tolist()
+    return HoleChoice(tuple((float(x), float(y)) for x, y in hole), ((f, h), (g, i)))
 
 
 def default_hole(mesh: PolyMesh, face: int, n_sides: int) -> HoleChoice | None:
@@ -90,15 +90,3 @@ def _fits_inside(ring: FloatArray, hole: FloatArray) -> bool:
     return bool(
         np.isfinite(hole).all() and is_simple_ring(hole) and is_simple_ring(ring) and is_ring_inside(hole, ring)
     )
-
-
-def _best_pair(ring: FloatArray, hole: FloatArray, bridges: IntArray) -> tuple[Bridge, Bridge] | None:
-    """The best two of the free bridges (b,2), the one at the lower face corner first."""
-    lengths = np.sqrt(((ring[bridges[:, 0]] - hole[bridges[:, 1]]) ** 2).sum(axis=1))
-    order = np.argsort(lengths, kind="stable")
-    scale = 1.0 / np.sqrt(arc_area(ring, 0, len(ring) - 1))
-    b, c = best_bridges(ring, hole, bridges[order], scale * lengths[order], BALANCE_WEIGHT)
-    if b < 0:
-        return None
-    low, high = sorted((int(f), int(h)) for f, h in bridges[order][[b, c]])
-    return low, high

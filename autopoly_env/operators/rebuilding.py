@@ -6,7 +6,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from autopoly_env.arrays import FloatArray
+from autopoly_env.arrays import FloatArray, IntArray
 from autopoly_env.errors import IllegalActionError
 from autopoly_env.mesh import Face, PolyMesh, Topology
 
@@ -21,14 +21,17 @@ def refusal(operator: str, kind: str, element: int, reason: str) -> IllegalActio
 def grown(
     mesh: PolyMesh,
     points: Sequence[Sequence[float]] | FloatArray,
-    faces: Sequence[Face],
+    faces: Sequence[Face] | IntArray,
     n_new_faces: int = 0,
 ) -> PolyMesh:
-    """The mesh with `points` appended and `faces` for its faces, of which the last `n_new_faces` are new."""
+    """The mesh with `points` appended and `faces` for its faces, of which the last `n_new_faces` are new.
+
+    In the place of faces a packed topology will do, as kernels make it.
+    """
     n, new_id, new_face = len(mesh.vertex_ids) + len(points), mesh.next_vertex_id, mesh.next_face_id
     return PolyMesh(
         np.concatenate((mesh.vertices, points)) if len(points) else mesh.vertices,
-        Topology(n, tuple(faces)),
+        Topology.of_packed(n, faces) if isinstance(faces, np.ndarray) else Topology(n, tuple(faces)),
         (*mesh.vertex_ids, *range(new_id, new_id + len(points))),
         (*mesh.face_ids, *range(new_face, new_face + n_new_faces)),
         new_id + len(points),
@@ -38,17 +41,23 @@ def grown(
 
 def shrunk(mesh: PolyMesh, faces: Sequence[Face], face_ids: tuple[int, ...]) -> PolyMesh:
     """The mesh with only `faces`; vertices that no face uses any more go."""
-    used = set().union(*faces)
-    kept = sorted(used)
-    if len(kept) == len(mesh.vertex_ids):
-        vertices, renumbered = mesh.vertices, tuple(faces)
-    else:
-        index = dict(zip(kept, range(len(kept)), strict=True))
-        vertices, renumbered = mesh.vertices[kept], tuple(map(tuple, map(map, repeat(index.__getitem__), faces)))
+    kept = sorted(set().union(*faces))
+    index = dict(zip(kept, range(len(kept)), strict=True))
+    renumbered = tuple(map(tuple, map(map, repeat(index.__getitem__), faces)))
+    return _left(mesh, Topology(len(kept), renumbered), kept, face_ids)
+
+
+def shrunk_to(mesh: PolyMesh, packed: IntArray, kept: IntArray, face_ids: tuple[int, ...]) -> PolyMesh:
+    """`shrunk` to a packed topology of the vertices `kept`, ascending, as `edit_kernels` make it."""
+    return _left(mesh, Topology.of_packed(len(kept), packed), kept.tolist(), face_ids)
+
+
+def _left(mesh: PolyMesh, topology: Topology, kept: list[int], face_ids: tuple[int, ...]) -> PolyMesh:
+    is_whole = len(kept) == len(mesh.vertex_ids)
     return PolyMesh(
-        vertices,
-        Topology(len(kept), renumbered),
-        tuple(map(mesh.vertex_ids.__getitem__, kept)),
+        mesh.vertices if is_whole else mesh.vertices[kept],
+        topology,
+        mesh.vertex_ids if is_whole else tuple(map(mesh.vertex_ids.__getitem__, kept)),
         face_ids,
         mesh.next_vertex_id,
         mesh.next_face_id,

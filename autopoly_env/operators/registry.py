@@ -37,7 +37,7 @@ def register(operator: Operator) -> Operator:
             f"an operator cannot be called {operator.name!r}; give it a name of its own, such as edge_cap"
         )
     known = OPERATORS.setdefault(operator.name, operator)
-    if known != operator:
+    if known is not operator and known != operator:
         raise ConfigError(f"{operator.name!r} is an operator of {known.module} already; give yours another name")
     return known
 

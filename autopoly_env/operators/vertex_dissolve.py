@@ -3,22 +3,22 @@
 from collections.abc import Iterator
 from typing import Any
 
-import numpy as np
-
 from autopoly_env.arrays import BoolArray
 from autopoly_env.mesh import PolyMesh
+from autopoly_env.operators import edit_kernels
 from autopoly_env.operators.action import Choice, Start
 from autopoly_env.operators.deeds import NOTHING, Press, select
 from autopoly_env.operators.elements import VERTEX
 from autopoly_env.operators.mirroring import again
 from autopoly_env.operators.operator import Mirroring, Operator
-from autopoly_env.operators.rebuilding import corner_of, refusal, shrunk, without
+from autopoly_env.operators.rebuilding import corner_of, refusal, shrunk_to
 from autopoly_env.operators.wording import Gesture, Phrases, begun_with
 
 
 def dissolvable_vertices(mesh: PolyMesh) -> BoolArray:
     """(V,) the boundary vertices with two edges, of no triangle, whose neighbours are not joined already."""
-    return np.array([_defect(mesh, v) is None for v in range(len(mesh.vertex_ids))], np.bool_)
+    mask: BoolArray = edit_kernels.dissolvable(mesh.topology.packed, len(mesh.vertex_ids))
+    return mask
 
 
 def _defect(mesh: PolyMesh, vertex: int) -> str | None:
@@ -40,8 +40,9 @@ def dissolve(mesh: PolyMesh, vertex: int, _choice: Choice | None) -> PolyMesh:
     defect = _defect(mesh, vertex)
     if defect is not None:
         raise refusal("vertex_dissolve", "vertex", vertex, defect)
-    f, i = corner_of(mesh, mesh.topology.lone_corner(vertex))
-    return shrunk(mesh, (*mesh.faces[:f], without(mesh.faces[f], i), *mesh.faces[f + 1 :]), mesh.face_ids)
+    topology = mesh.topology
+    packed, kept = edit_kernels.without_corner(topology.packed, topology.n_vertices, topology.lone_corner(vertex))
+    return shrunk_to(mesh, packed, kept, mesh.face_ids)
 
 
 def _mirror(of: Mirroring, start: Start) -> Iterator[Start]:

@@ -1,5 +1,7 @@
 """What follows from the faces of a mesh: by hand on an L, and beside dictionaries on any mesh."""
 
+import pickle
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -66,3 +68,18 @@ def test_arrays__are_those_of_dictionaries(mesh: PolyMesh) -> None:
 def test_topology__with_a_vertex_that_there_is_not_is_refused(vertex: int) -> None:
     with pytest.raises(MeshError, match="a face has a vertex beyond the 3 that there are"):
         _ = Topology(3, ((0, 1, vertex),)).edges
+
+
+@given(meshes())
+def test_topology__of_what_a_kernel_made_is_that_of_the_faces(mesh: PolyMesh) -> None:
+    plain = Topology(mesh.topology.n_vertices, mesh.faces)
+    packed = Topology.of_packed(plain.n_vertices, plain.packed.copy())
+    assert packed.n_faces == len(mesh.faces) and packed.n_corners == plain.n_corners
+    assert packed == plain and hash(packed) == hash(plain)
+    assert packed.faces == mesh.faces and pickle.loads(pickle.dumps(packed)) == plain
+    assert packed != Topology(plain.n_vertices + 1, mesh.faces) and packed != mesh.faces
+
+
+def test_topology__has_no_other_attributes() -> None:
+    with pytest.raises(AttributeError, match="a Topology has no 'corner_count'"):
+        _ = Topology(3, ((0, 1, 2),)).corner_count

@@ -1,8 +1,11 @@
 """Actions: their flat numbering, the mask that goes with it, and how they read."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
+from hypothesis import strategies as st
 
 from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.mesh import PolyMesh, is_valid
@@ -16,6 +19,7 @@ from autopoly_env.operators import (
     legal_actions,
     preset,
 )
+from autopoly_env.operators.masks import legal_masks
 from tests.helpers.strategies import meshes
 
 PAPER = tuple(operator.name for operator in preset("paper"))
@@ -148,3 +152,48 @@ def test_describe__names_elements_by_their_ids(action: Action, words: str) -> No
 def test_legal_actions__refuses_an_unknown_operator() -> None:
     with pytest.raises(ConfigError, match="operator 'twist' is unknown"):
         legal_actions(quad(), ("twist",))
+
+
+@given(meshes(), st.integers(4, 40))
+def test_masks__of_all_operators_at_once_are_those_of_each(mesh: PolyMesh, most: int) -> None:
+    codec = ActionCodec(tuple(OPERATORS), most)
+    mask = codec.legal_mask(mesh)
+    room = [most, CAPACITY_PER_VERTEX["edge"] * most, CAPACITY_PER_VERTEX["face"] * most]
+    for (operator, found), name in zip(legal_masks(mesh, preset(OPERATORS)), OPERATORS, strict=True):
+        own = operator.legal_mask(mesh)
+        assert operator.name == name and (found == own).all()
+        place = codec.indices_of(name)
+        after = np.array([np.add(mesh.counts, operator.change_at(mesh, e)) for e in range(len(own))])
+        fits = ((after <= room) | (after <= mesh.counts)).all(axis=1)
+        expected = np.zeros(place.stop - place.start, np.bool_)
+        n = min(len(own), len(expected))
+        expected[:n] = (own & fits)[:n]
+        assert (mask[place] == expected).all(), name
+
+
+def test_masks__of_an_operator_with_a_mask_of_its_own_are_that(monkeypatch: pytest.MonkeyPatch) -> None:
+    none = replace(OPERATORS["face_delete"], mask=lambda mesh: np.zeros(len(mesh.faces), np.bool_))
+    monkeypatch.setitem(OPERATORS, "face_delete", none)
+    mesh = PolyMesh.grid(2, 0.0, 0.0, 1.0, 1.0)
+    assert [action.operator for action in legal_actions(mesh, ("face_delete",))] == []
+    assert ActionCodec(("face_delete",), 9).legal_mask(mesh).nonzero()[0].tolist() == [0]
+
+
+@given(meshes())
+def test_masks__of_what_dissolves_are_those_of_sets(mesh: PolyMesh) -> None:
+    faces, joined = list(map(set, mesh.faces)), {frozenset(pair) for pair in mesh.edges.tolist()}
+    for v, dissolves in enumerate(OPERATORS["vertex_dissolve"].legal_mask(mesh).tolist()):
+        around = [face for face in mesh.faces if v in face]
+        k = around[0].index(v)
+        ends = {around[0][k - 1], around[0][(k + 1) % len(around[0])]}
+        assert dissolves == (len(around) == 1 and len(around[0]) > 3 and ends not in joined)
+    for (a, b), dissolves in zip(
+        mesh.edges.tolist(), OPERATORS["edge_dissolve"].legal_mask(mesh).tolist(), strict=True
+    ):
+        beside = [face for face in faces if {a, b} <= face and _has_side(mesh, face, a, b)]
+        assert dissolves == (len(beside) == 2 and beside[0] & beside[1] == {a, b})
+
+
+def _has_side(mesh: PolyMesh, face: set[int], a: int, b: int) -> bool:
+    ring = next(ring for ring in mesh.faces if set(ring) == face)
+    return any({ring[k - 1], ring[k]} == {a, b} for k in range(len(ring)))
