@@ -49,11 +49,15 @@ class Score:
 
 def score(mesh: PolyMesh, target: Target, weights: ScoreWeights) -> Score:
     """Score a mesh against a target at the target's resolution."""
-    iou = intersection_over_union(mesh, target)
+    return score_of(mesh, intersection_over_union(mesh, target), weights)
+
+
+def score_of(mesh: PolyMesh, iou: float, weights: ScoreWeights, complexity: int | None = None) -> Score:
+    """Score a mesh whose IoU is known; `complexity` in the place of its own, where that is given."""
     crossings = self_intersections(mesh)
-    complexity = mesh.complexity
-    total = weights.w_sm * iou - weights.w_sc * complexity - weights.w_si * crossings
-    return Score(iou, complexity, crossings, total)
+    counted = mesh.complexity if complexity is None else complexity
+    total = weights.w_sm * iou - weights.w_sc * counted - weights.w_si * crossings
+    return Score(iou, counted, crossings, total)
 
 
 def intersection_over_union(mesh: PolyMesh, target: Target) -> float:
@@ -64,7 +68,12 @@ def intersection_over_union(mesh: PolyMesh, target: Target) -> float:
     """
     edges = mesh.topology.boundary_half_edges
     work = workspace(target.resolution, len(edges))
-    inside, filled = raster_kernels.overlap_counts(mesh.vertices, edges, pixels_of(target), work)
+    return iou_of(raster_kernels.overlap_counts(mesh.vertices, edges, pixels_of(target), work), target)
+
+
+def iou_of(overlap: tuple[float, float], target: Target) -> float:
+    """The IoU by what a mesh fills: (inside the target's mask, all of it), as `raster_kernels.overlap_counts` says."""
+    inside, filled = overlap
     union = filled + target.n_filled - inside
     return float(inside / union) if union else 1.0
 

@@ -7,6 +7,7 @@ refit to the target finds. States are immutable values; a simulator draws no ran
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -22,8 +23,21 @@ from autopoly_env.mesh import FaceRule, PolyMesh, Topology, broken_faces, check_
 from autopoly_env.mesh.symmetry import mirrored
 from autopoly_env.operators import STOP, Action, Choice, Halfway, Operator, Start, describe, legal_actions, preset
 from autopoly_env.placement import Disagreement, Trial, tried
-from autopoly_env.refit import FROM_AFAR, LOCAL, THOROUGH, RefitConfig, RefitTarget, holding, mended, refit, tune
-from autopoly_env.score import Score, ScoreWeights, score
+from autopoly_env.refit import (
+    FROM_AFAR,
+    LOCAL,
+    THOROUGH,
+    Judge,
+    RefitConfig,
+    RefitResult,
+    RefitTarget,
+    holding,
+    mended,
+    refit,
+    refit_best,
+    tune,
+)
+from autopoly_env.score import Score, ScoreWeights, iou_of, score, score_of
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence.lesson import share_moved
 from autopoly_env.silhouette import SMALL, Silhouette
@@ -34,6 +48,7 @@ _N_REFINED = 3  # refits at it, each towards more than the IoU of the one before
 _HAIRLINE_COST = 5.0  # points of r_all off in choosing, for each: as a crossing's
 _LOSS_COST = 50.0  # the same for a part or a hole that is to be kept and is not, times w_sc where that is above 1
 _BACKGROUND_STEPS = 16  # between weights 0 and 1, so that few targets are prepared
+_QUAD = Topology(4, ((0, 1, 2, 3),))
 
 
 @dataclass(frozen=True)
@@ -106,6 +121,7 @@ class Simulator:
         own = self.silhouette.resolution
         self._target = self.silhouette.target(resolution)
         self._scored = self.silhouette.target(own) if self.silhouette.is_scored_by_area else self._target
+        self._judge = Judge(self._scored)
         self.finest = min(own, POLISH_RESOLUTION)  # pixels a side at which meshes are finished
         self._refined_at = own * -(-SMALL // own) if self.silhouette.is_scored_by_area else self.finest  # whole blocks
         self.n_refits = 0  # that its transitions and initial states have taken so far, whoever asked for them
@@ -168,10 +184,10 @@ class Simulator:
             self.guidance.check_symmetric(mesh)
             self._check_faces(mesh, "the mesh")
             return self._ended(State(mesh, self.score(mesh), n_refits=0))
-        fits = yield [self._refit_job(box, FROM_AFAR, 1.0) for box in self._bounding_boxes()]
+        fits = yield [self._refit_job([box], FROM_AFAR, 1.0) for box in self._bounding_boxes()]
         self.n_refits += len(fits)
-        best = max((fit.mesh for fit in fits), key=lambda fit: self.score(fit).total)
-        return self._ended(State(best, self.score(best), n_refits=len(fits)))
+        states = (State(fit.mesh, self._score_of(fit), n_refits=len(fits)) for fit in fits)
+        return self._ended(max(states, key=lambda state: state.score.total))
 
     def _bounding_boxes(self) -> Iterator[PolyMesh]:
         target, size = self._target, self.resolution
@@ -225,8 +241,10 @@ class Simulator:
         Small pictures are scored on exact areas at any resolution.
         Then `docked` is taken off the total, by which agents choose.
         """
-        worth = score(mesh, self._scored, self.weights)
-        off = 0.0 if before is None else self.docked(before, mesh)
+        return self._docked(score(mesh, self._scored, self.weights), before, mesh)
+
+    def _docked(self, worth: Score, before: PolyMesh | None, after: PolyMesh) -> Score:
+        off = 0.0 if before is None else self.docked(before, after)
         return replace(worth, total=worth.total - off) if off else worth
 
     def docked(self, before: PolyMesh, after: PolyMesh) -> float:
@@ -246,13 +264,14 @@ class Simulator:
         """Whether the mesh is sane, keeps the rule of faces and has no hairlines in view of the picture."""
         return self.is_sane(mesh) and not self.hairlines(mesh)
 
-    def off(self, mesh: PolyMesh) -> float:
+    def off(self, mesh: PolyMesh, n_hairlines: int | None = None) -> float:
         """Points of r_all that count against a mesh in choosing, though not in its score.
 
         They are five for every hairline, as for a crossing, and fifty or more for every hole and part of the picture
-        that is to be kept (`keep`) and is not there.
+        that is to be kept (`keep`) and is not there. `n_hairlines` are those of the mesh, where they are known already.
         """
-        return _HAIRLINE_COST * self.hairlines(mesh) + _LOSS_COST * max(1.0, self.weights.w_sc) * self._n_lost(mesh)
+        n_thin = self.hairlines(mesh) if n_hairlines is None else n_hairlines
+        return _HAIRLINE_COST * n_thin + _LOSS_COST * max(1.0, self.weights.w_sc) * self._n_lost(mesh)
 
     def _n_lost(self, mesh: PolyMesh) -> int:
         if not self.guidance.keep:
@@ -397,35 +416,44 @@ class Simulator:
     def _refitted(self, state: State, trial: Trial) -> Routine[State]:
         """The refit with the fewest crossings and flipped faces, and of those the best, from the trial's starts."""
         if not trial.shows:
-            choice, mesh, halfway = trial.starts[0]
-            n_refits = 0
+            (choice, mesh, halfway), n_refits = trial.starts[0], 0
+            score = self.score(mesh, state.mesh)
         else:
-            fits = yield [self._refit_job(start.mesh, THOROUGH, state.score.iou) for start in trial.starts]
+            n_refits = len(trial.starts)
+            alike = _of_one_topology(trial.starts)
+            fits = yield [self._refit_job([start.mesh for start in some], THOROUGH, state.score.iou) for some in alike]
             k = min(range(len(fits)), key=lambda k: (sum(self.defects_of(fits[k].mesh)), fits[k].loss))
-            (choice, begun, halfway), mesh, n_refits = trial.starts[k], fits[k].mesh, len(fits)
+            choice, begun, halfway = alike[k][fits[k].which]
+            mesh, score = fits[k].mesh, self._score_of(fits[k], state.mesh)
             if self.docked(state.mesh, mesh) > 0.0:
                 held = yield from self._held(state, begun)
                 mesh = max((mesh, *held), key=lambda m: (-sum(self.defects_of(m)), self.score(m, state.mesh).total))
+                score = self.score(mesh, state.mesh)
                 n_refits += len(held)
-        score = self.score(mesh, state.mesh)
         after = State(mesh, score, state.step + 1, "", trial.action, choice, n_refits, halfway)
         return self._ended(after)
 
     def _held(self, state: State, begun: PolyMesh) -> Routine[list[PolyMesh]]:
         """Refits in which old vertices stay: all of them, and all but the ends of edges that the action changed."""
         old = np.isin(begun.vertex_ids, state.mesh.vertex_ids)
-        jobs = [self._refit_job(begun, THOROUGH, state.score.iou, old)]
+        jobs = [self._refit_job([begun], THOROUGH, state.score.iou, old)]
         near = np.isin(begun.vertex_ids, list(_ends_changed(state.mesh, begun)))
         if (old & near).any():
-            jobs.append(self._refit_job(begun, THOROUGH, state.score.iou, old & ~near))
+            jobs.append(self._refit_job([begun], THOROUGH, state.score.iou, old & ~near))
         fits = yield jobs
         return [fit.mesh for fit in fits]
 
-    def _refit_job(self, mesh: PolyMesh, config: RefitConfig, iou: float, held: BoolArray | None = None) -> Job:
-        """A refit of all vertices, or of those that are not `held` (V,)."""
-        bonds = self.guidance.bonds(mesh)
+    def _refit_job(
+        self, starts: Sequence[PolyMesh], config: RefitConfig, iou: float, held: BoolArray | None = None
+    ) -> Job:
+        """The best refit from starts of one topology, of all vertices, or of those that are not `held` (V,)."""
+        bonds = self.guidance.bonds(starts[0])
         bonds = bonds if held is None else holding(bonds, held)
-        return partial(refit, mesh, self.refit_target(iou), config, bonds, self.faces)
+        return partial(refit_best, starts, self.refit_target(iou), config, bonds, self.faces, self._judge)
+
+    def _score_of(self, fit: RefitResult, before: PolyMesh | None = None) -> Score:
+        """`score` of a refitted mesh, whose IoU is known by then."""
+        return self._docked(score_of(fit.mesh, iou_of(fit.overlap, self._scored), self.weights), before, fit.mesh)
 
     def _ended(self, state: State) -> State:
         """The state with its end marked, if this is one."""
@@ -480,9 +508,14 @@ class Simulator:
         return mesh
 
 
+def _of_one_topology(starts: Sequence[Start]) -> list[list[Start]]:
+    """The starts in groups of neighbours that share a topology."""
+    return [list(some) for _, some in groupby(starts, key=lambda start: id(start.mesh.topology))]
+
+
 def _quad(corners: FloatArray) -> PolyMesh:
     """A mesh of one quad, which is known to be sound; `corners` (4, 2)."""
-    return PolyMesh(corners, Topology(4, ((0, 1, 2, 3),)), (0, 1, 2, 3), (0,), 4, 1)
+    return PolyMesh(corners, _QUAD, (0, 1, 2, 3), (0,), 4, 1)
 
 
 def _places_on_border(mesh: PolyMesh, vertex: int) -> Iterator[FloatArray]:

@@ -45,8 +45,8 @@ TABLES = {
         simulator: the rules: State, transition(state, action)
         guidance: a user's wishes | targets: what is to be built | export: a mesh becomes a file
         sequence: a construction: JSON that replays bit for bit
-        details: parts, holes, hairlines: what is lost
         placement: where new vertices begin | refit: a mesh meets the target | score: r_all | observation: what is seen
+        details: parts, holes, hairlines: what is lost
         operators: an action becomes a mesh | raster: exact coverage, exact derivatives | viewer: pictures of meshes
         mesh: PolyMesh: vertices, faces, their topology
         silhouette: an image becomes a mask

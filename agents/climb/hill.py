@@ -9,8 +9,8 @@ from agents.trace.reach import Reach
 from agents.trace.rings import trace_rings
 from autopoly_env.compute import map_threads
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.refit import RefitConfig
-from autopoly_env.score import Score
+from autopoly_env.refit import Judge, RefitConfig, refit
+from autopoly_env.score import Score, iou_of
 from autopoly_env.simulator import Simulator
 
 LEAST_GAIN = 1e-9  # of r_all, below which a place is no better than another
@@ -39,16 +39,24 @@ class Hill:
         self.contours = trace_rings(simulator.silhouette)
         self.reach = Reach.of(simulator)
         self._pixels = simulator.silhouette.target(simulator.finest)
+        self._judge = Judge(self._pixels, self._pixels)
 
     def place(self, outline: Outline) -> Place:
         """The outline as it is; its total is less what is off it in choosing."""
         score = outline.score(self._pixels, self.simulator.weights)
-        return Place(outline, replace(score, total=score.total - self.simulator.off(outline.loops)))
+        return _placed(outline, score, self.simulator.off(outline.loops))
 
     def fit(self, outlines: Sequence[Outline], config: RefitConfig, iou: float) -> list[Place]:
         """Each outline refitted, on all cores, on the way to more than `iou`."""
         target = self.simulator.refit_target(iou)
-        return map_threads(lambda outline: self.place(outline.refitted(target, config)), outlines)
+
+        def fitted(outline: Outline) -> Place:
+            fit = refit(outline.loops, target, config, judge=self._judge)
+            moved = outline.moved(fit.mesh)
+            score = moved.scored(iou_of(fit.overlap, self._pixels), self.simulator.weights)
+            return _placed(moved, score, self.simulator.off(fit.mesh, fit.n_hairlines))
+
+        return map_threads(fitted, outlines)
 
     def refined(self, place: Place) -> Place:
         """The outline refitted at the silhouette's own resolution."""
@@ -57,6 +65,10 @@ class Hill:
     def polished(self, place: Place) -> Place:
         """The outline refitted and tuned, as a finished mesh is."""
         return self.place(place.outline.moved(self.simulator.polish(place.outline.loops)))
+
+
+def _placed(outline: Outline, score: Score, off: float) -> Place:
+    return Place(outline, replace(score, total=score.total - off) if off else score)
 
 
 def total_of(place: Place) -> float:

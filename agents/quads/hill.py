@@ -76,9 +76,9 @@ class QuadHill:
     def _cut(self, outline: Outline, partition: Partition | None, iou: float) -> QuadPlace:
         weights = self.simulator.weights
         if partition is None:
-            score = outline.scored(iou, outline.complexity, weights)
+            score = outline.scored(iou, weights)
             return QuadPlace(outline, None, score, score.total - _UNCUT)
-        score = outline.scored(iou, complexity_of(outline, len(partition.faces)), weights)
+        score = outline.scored(iou, weights, complexity_of(outline, len(partition.faces)))
         n_triangles = len(partition.faces) - partition.n_quads
         off = weights.w_sc * _TRIANGLE * n_triangles + self.simulator.off(outline.loops)
         return QuadPlace(outline, partition, score, score.total - off)

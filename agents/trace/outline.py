@@ -12,7 +12,7 @@ from agents.trace.rings import Ring, signed_area
 from autopoly_env.arrays import FloatArray
 from autopoly_env.mesh import PolyMesh, Topology
 from autopoly_env.refit import Bonds, RefitConfig, RefitTarget, refit
-from autopoly_env.score import Score, ScoreWeights, intersection_over_union, self_intersections
+from autopoly_env.score import Score, ScoreWeights, intersection_over_union, score_of
 from autopoly_env.silhouette import Target
 from autopoly_env.simulator import MANY_VERTICES
 
@@ -65,22 +65,26 @@ class Outline:
 
     def score(self, target: Target, weights: ScoreWeights) -> Score:
         """The score of the mesh that has these rings, its bridges crossing nothing."""
-        return self.scored(intersection_over_union(self.loops, target), self.complexity, weights)
+        return self.scored(intersection_over_union(self.loops, target), weights)
 
-    def scored(self, iou: float, complexity: int, weights: ScoreWeights) -> Score:
-        """The score of a mesh that has these rings and this IoU, its inner edges crossing nothing."""
-        crossings = self_intersections(self.loops)
-        total = weights.w_sm * iou - weights.w_sc * complexity - weights.w_si * crossings
-        return Score(iou, complexity, crossings, total)
+    def scored(self, iou: float, weights: ScoreWeights, complexity: int | None = None) -> Score:
+        """The score of a mesh that has these rings, this IoU and, if it is given, complexity.
+
+        Its inner edges cross nothing.
+        """
+        return score_of(self.loops, iou, weights, self.complexity if complexity is None else complexity)
 
     def refitted(self, target: RefitTarget, config: RefitConfig, bonds: Bonds | None = None) -> "Outline":
         """The rings moved to match the target, as far as bonds of `loops` let them."""
         return self.moved(refit(self.loops, target, config, bonds).mesh)
 
     def moved(self, loops: PolyMesh) -> "Outline":
-        """The rings at the positions of `loops`."""
-        parts = [loops.vertices[list(cycle)] for cycle in loops.faces]
-        return Outline(tuple(Ring(p, ring.parent) for p, ring in zip(parts, self.rings, strict=True)))
+        """The rings at the positions of `loops`, which has the vertices of this outline's own, elsewhere."""
+        bounds = loops.topology.face_offsets.tolist()
+        parts = [loops.vertices[a:b].copy() for a, b in pairwise(bounds)]
+        made = Outline(tuple(Ring(part, ring.parent) for part, ring in zip(parts, self.rings, strict=True)))
+        made.__dict__["loops"] = loops
+        return made
 
     def with_ring(self, index: int, ring: Ring) -> "Outline":
         """The outline with one ring replaced."""

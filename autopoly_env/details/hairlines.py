@@ -3,6 +3,7 @@
 A corridor of no width between two parts saves a face and shows in no pixel; so does a slit from a hole to the outside.
 """
 
+from autopoly_env.arrays import FloatArray
 from autopoly_env.details import hairline_kernels
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.silhouette import Target
@@ -18,6 +19,11 @@ def hairlines(mesh: PolyMesh, target: Target) -> int:
     Asked for is the target at the picture's own resolution. Corridors and slits narrower than an eighth of a pixel
     count in any case: `mesh.is_sane` knows no picture, and refuses what is narrower still.
     """
-    pixel = 1.0 / min(target.resolution, FINEST)
     rim = mesh.topology.boundary_half_edges
-    return int(hairline_kernels.count_hairlines(mesh.vertices, rim, target.coverage, _WIDTH * pixel, _LEAST * pixel))
+    return int(hairline_kernels.count_hairlines(mesh.vertices, rim, *hairline_arguments(target)))
+
+
+def hairline_arguments(target: Target) -> tuple[FloatArray, float, float]:
+    """What `hairline_kernels.count_hairlines` is to be called with for a target: its coverage, and two widths."""
+    pixel = 1.0 / min(target.resolution, FINEST)
+    return target.coverage, _WIDTH * pixel, _LEAST * pixel

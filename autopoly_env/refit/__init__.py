@@ -8,12 +8,14 @@ from autopoly_env.refit.refitting import (
     QUICK,
     THOROUGH,
     Bonds,
+    Judge,
     RefitConfig,
     RefitResult,
     RefitTarget,
     holding,
     quick_resolution,
     refit,
+    refit_best,
 )
 from autopoly_env.refit.tuning import tune
 
@@ -24,6 +26,7 @@ __all__ = [
     "QUICK",
     "THOROUGH",
     "Bonds",
+    "Judge",
     "RefitConfig",
     "RefitResult",
     "RefitTarget",
@@ -31,5 +34,6 @@ __all__ = [
     "mended",
     "quick_resolution",
     "refit",
+    "refit_best",
     "tune",
 ]

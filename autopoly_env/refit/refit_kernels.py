@@ -1,14 +1,18 @@
 """The refit as a whole: the near phase up the pyramid, the far phase if it is asked for, the best sane mesh kept.
 
-Letters: see `shape_kernels`.
+A call refits one mesh from several starts and says what the best of them is worth, for most of what asks for refits
+asks for that next. Letters: see `shape_kernels`; S starts.
 """
 
 import numpy as np
 
-from autopoly_env.arrays import FloatArray, IntArray
-from autopoly_env.compute import kernel
+from autopoly_env.arrays import BoolArray, FloatArray, IntArray
+from autopoly_env.compute import kernel, uncounted_kernel
+from autopoly_env.details.hairline_kernels import count_hairlines
+from autopoly_env.mesh.corner_kernels import LEAST_TURN, n_flat_faces
 from autopoly_env.mesh.geometry_kernels import count_defects
-from autopoly_env.raster.raster_kernels import Picture, Workspace
+from autopoly_env.mesh.topology_kernels import links_in
+from autopoly_env.raster.raster_kernels import Picture, Pixels, Workspace, overlap_counts
 from autopoly_env.refit.far_kernels import far_phase
 from autopoly_env.refit.near_kernels import near_phase
 from autopoly_env.refit.pyramid_kernels import picture_in
@@ -37,27 +41,71 @@ _NEARLY_RIGHT = 1.0  # times R: a loss below it leaves next to nothing for the f
 
 @kernel
 def refit(
-    start: FloatArray, packed: IntArray, bound: IntArray, axis: float, asked: float,
+    starts: FloatArray, packed: IntArray, bound: IntArray, axis: float, asked: float,
     coverages: FloatArray, sums: FloatArray,
     first_level: int, n_near: int, n_far: int, stiffness: float, damping: float, tolerance: float, keep_defects: bool,
-    work: Workspace, result: FloatArray,
-) -> tuple[float, float, int]:  # fmt: skip
-    """Fit all vertices to the target; write (V, 2) `result`; return (loss before, loss after, evaluations).
+    mask: BoolArray, mask_sum: FloatArray, weight_sum: FloatArray, by_area: bool,
+    shown: FloatArray, width: float, least: float,
+    work: Workspace, results: FloatArray,
+) -> tuple[int, float, float, int, int, int, int, int, float, float, int]:  # fmt: skip
+    """Fit all vertices to the target from each of the `starts` (S, V, 2); write `results`, alike.
 
-    The arguments are those of `shape_of`, those of `picture_in`, and those of `Settings`, which numbers cross into a
-    kernel sooner than tuples. The loss is the sum of squared coverage errors at the finest level. The result has no
-    larger loss than the start, and no more crossings, hairlines or flipped faces unless `keep_defects` is true. A start
-    that is not finite has no loss: NaN, and nothing is written.
+    The arguments are those of `shape_of`, those of `picture_in`, those of `Settings`, those of `Pixels`, and those of
+    `count_hairlines`, which numbers cross into a kernel sooner than tuples. Returned are the start k that led to the
+    fewest defects, and of those to the least loss; of it the loss before and after, the evaluations, what
+    `count_defects` finds, the `overlap_counts` of the pixels and the hairlines in `shown`; 0 where these are empty.
+
+    The loss is the sum of squared coverage errors at the finest level. A result has no larger loss than its start, and
+    no more crossings, hairlines or flipped faces unless `keep_defects` is true. Of a start that is not finite nothing
+    is written; k is -1 where all are.
     """
-    for v in range(start.shape[0]):
-        if not (np.isfinite(start[v, 0]) and np.isfinite(start[v, 1])):
-            return np.nan, np.nan, 0
     shape = shape_of(packed, bound, axis, asked)
     pyramid = (
         picture_in(coverages, sums, 0), picture_in(coverages, sums, 1), picture_in(coverages, sums, 2),
         picture_in(coverages, sums, 3),
     )  # fmt: skip
     settings = Settings(first_level, n_near, n_far, stiffness, damping, tolerance, keep_defects)
+    boxes = np.empty((shape.edges.shape[0], 4))
+    best, n_defects = -1, 0
+    before, after, n_evaluations = np.nan, np.nan, 0
+    crossings, uncertain, hairlines, flipped = 0, 0, 0, 0
+    for k in range(starts.shape[0]):
+        if not is_finite(starts[k]):
+            continue
+        first, last, n_made = _fit(starts[k], shape, pyramid, settings, boxes, work, results[k])
+        found = count_defects(results[k], shape.edges, shape.sides, shape.corners, shape.offsets, boxes)
+        n_found = found[0] + found[2] + found[3]
+        if asked > 0.0:
+            n_found += n_flat_faces(results[k], shape.corners, shape.offsets, LEAST_TURN)
+        if best < 0 or n_found < n_defects or (n_found == n_defects and last < after):
+            best, n_defects = k, n_found
+            before, after, n_evaluations = first, last, n_made
+            crossings, uncertain, hairlines, flipped = found
+    inside, filled, n_slits = 0.0, 0.0, 0
+    if best >= 0 and mask.shape[0] > 0:
+        inside, filled = overlap_counts(
+            results[best], links_in(packed).boundary, Pixels(mask, mask_sum, weight_sum, by_area), work
+        )
+    if best >= 0 and shown.shape[0] > 0:
+        n_slits = count_hairlines(results[best], links_in(packed).boundary, shown, width, least)
+    return best, before, after, n_evaluations, crossings, uncertain, hairlines, flipped, inside, filled, n_slits
+
+
+@uncounted_kernel
+def is_finite(points: FloatArray) -> bool:
+    """Whether all of the points (V, 2) are."""
+    for v in range(points.shape[0]):
+        if not (np.isfinite(points[v, 0]) and np.isfinite(points[v, 1])):
+            return False
+    return True
+
+
+@kernel
+def _fit(
+    start: FloatArray, shape: Shape, pyramid: tuple[Picture, ...], settings: Settings, boxes: FloatArray,
+    work: Workspace, result: FloatArray,
+) -> tuple[float, float, int]:  # fmt: skip
+    """Fit all vertices to the target; write (V, 2) `result`; return (loss before, loss after, evaluations)."""
     n = shape.boundary.shape[0]
     unknowns, scratch = np.empty((n, 2)), np.empty((n, 2))
     low, high = 0.0, 1.0
@@ -67,7 +115,6 @@ def refit(
             unknowns[k, axis] = start[v, axis]
             low, high = min(low, start[v, axis]), max(high, start[v, axis])
     fine = pyramid[len(pyramid) - 1]
-    boxes = np.empty((shape.edges.shape[0], 4))
     best = Progress(start.copy(), start.copy(), np.empty((start.shape[0], 2)), boxes, np.zeros(7))
     crossings, _, hairlines, flipped = count_defects(
         best.start, shape.edges, shape.sides, shape.corners, shape.offsets, boxes

@@ -18,15 +18,16 @@ each pixel times its weight where the target has weights.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from autopoly_env.arrays import BoolArray, FloatArray, IntArray, read_only
+from autopoly_env.details import hairline_arguments
 from autopoly_env.errors import MeshError
-from autopoly_env.mesh import ASKED_TURN, FaceRule, PolyMesh, Topology
-from autopoly_env.raster import workspace
-from autopoly_env.raster.raster_kernels import Picture
+from autopoly_env.mesh import ASKED_TURN, Defects, FaceRule, PolyMesh, Topology
+from autopoly_env.raster import pixels_of, workspace
+from autopoly_env.raster.raster_kernels import NO_WEIGHTS, Picture, Pixels
 from autopoly_env.refit import refit_kernels
 from autopoly_env.refit.pyramid_kernels import N_LEVELS, packed_sums, picture_in
 from autopoly_env.refit.rule_kernels import FREE, LOCKED
@@ -34,6 +35,7 @@ from autopoly_env.refit.shape_kernels import Settings
 from autopoly_env.silhouette import WEIGHT_STEPS, Silhouette, Target
 
 _NOTHING = read_only(np.empty(0, np.int64))
+_NO_PIXELS = Pixels(read_only(np.empty((0, 0), np.bool_)), NO_WEIGHTS)
 
 
 @dataclass(frozen=True)
@@ -139,14 +141,38 @@ def holding(bonds: Bonds | None, held: BoolArray) -> Bonds:
     return replace(bonds, locked=bonds.locked | held & ((bonds.images < 0) | held[bonds.images]))
 
 
-@dataclass(frozen=True)
-class RefitResult:
+@dataclass(frozen=True, eq=False)
+class Judge:
+    """Targets that the mesh which a refit ends with is to be held to in the same call."""
+
+    scored: Target | None = None  # `RefitResult.overlap` is with it
+    shown: Target | None = None  # `RefitResult.n_hairlines` are those in view of it
+
+    @cached_property
+    def resolution(self) -> int:
+        """Pixels a side of what is scored."""
+        return 0 if self.scored is None else self.scored.resolution
+
+    @cached_property
+    def arguments(self) -> tuple[Any, ...]:
+        """The same for the kernel."""
+        pixels = _NO_PIXELS if self.scored is None else pixels_of(self.scored)
+        return *pixels, *((NO_WEIGHTS, 0.0, 0.0) if self.shown is None else hairline_arguments(self.shown))
+
+
+NOBODY = Judge()
+
+
+class RefitResult(NamedTuple):
     """A refitted mesh, and how far it came."""
 
     mesh: PolyMesh
     loss_before: float
     loss: float
     n_evaluations: int  # renderings with derivatives
+    which: int = 0  # of the starts led to it
+    overlap: tuple[float, float] = (0.0, 0.0)  # what `overlap_counts` counts: filled pixels inside the target, and all
+    n_hairlines: int = 0  # of `details.hairlines`
 
 
 def refit(
@@ -155,6 +181,7 @@ def refit(
     config: RefitConfig = DEFAULT,
     bonds: Bonds | None = None,
     faces: FaceRule = "any",
+    judge: Judge = NOBODY,
 ) -> RefitResult:
     """Move the vertices of `mesh` to match `target`, as far as `bonds` let them.
 
@@ -165,19 +192,40 @@ def refit(
     there.
     Raises MeshError for vertices that are not finite.
     """
-    moved = np.empty_like(mesh.vertices)
-    before, after, n_evaluations = refit_kernels.refit(
-        mesh.vertices,
+    return refit_best([mesh], target, config, bonds, faces, judge)
+
+
+def refit_best(
+    starts: Sequence[PolyMesh],
+    target: RefitTarget,
+    config: RefitConfig = DEFAULT,
+    bonds: Bonds | None = None,
+    faces: FaceRule = "any",
+    judge: Judge = NOBODY,
+) -> RefitResult:
+    """`refit` of meshes of one topology: the one that ends with the fewest defects, and of those with the least loss.
+
+    Defects are those of `mesh.defects_of` under the rule of faces; of equals it is the first.
+    Raises MeshError where none has finite vertices.
+    """
+    mesh = starts[0]
+    points = mesh.vertices[None] if len(starts) == 1 else read_only(np.array([s.vertices for s in starts]))
+    resolution = max(target.resolution, judge.resolution)
+    moved = np.empty_like(points)
+    which, before, after, n_evaluations, *found, inside, filled, n_hairlines = refit_kernels.refit(
+        points,
         *shape_arguments(mesh.topology, faces, bonds),
         target.coverages,
         target.sums,
         *config.settings,
-        workspace(target.resolution, len(mesh.topology.boundary_half_edges)),
+        *judge.arguments,
+        workspace(resolution, len(mesh.topology.boundary_half_edges)),
         moved,
     )
-    if before != before:  # NaN
+    if which < 0:
         raise MeshError("the mesh to refit has vertices that are not finite: give finite positions")
-    return RefitResult(mesh.with_vertices(moved), before, after, n_evaluations)
+    best = starts[which].with_vertices(moved[which], Defects(*found))
+    return RefitResult(best, before, after, n_evaluations, which, (inside, filled), n_hairlines)
 
 
 class _Bound(NamedTuple):

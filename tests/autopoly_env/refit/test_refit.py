@@ -9,12 +9,27 @@ from hypothesis import strategies as st
 
 from autopoly_env.arrays import FloatArray
 from autopoly_env.compute import map_threads, set_threads
-from autopoly_env.mesh import PolyMesh
+from autopoly_env.details import hairlines
+from autopoly_env.errors import MeshError
+from autopoly_env.mesh import PolyMesh, broken_faces, defects_of
 from autopoly_env.mesh.geometry_kernels import count_crossings
 from autopoly_env.raster import coverage
-from autopoly_env.refit import FROM_AFAR, LOCAL, QUICK, RefitConfig, RefitResult, RefitTarget, quick_resolution, refit
+from autopoly_env.refit import (
+    FROM_AFAR,
+    LOCAL,
+    QUICK,
+    THOROUGH,
+    Judge,
+    RefitConfig,
+    RefitResult,
+    RefitTarget,
+    quick_resolution,
+    refit,
+    refit_best,
+)
 from autopoly_env.refit.refitting import shape_arguments
 from autopoly_env.refit.shape_kernels import shape_of
+from autopoly_env.score import intersection_over_union, iou_of
 from autopoly_env.silhouette import Silhouette, Target
 from tests.helpers.shapes import frame, hourglass, pairs_that_meet, polygon
 from tests.helpers.strategies import meshes, random_walk
@@ -288,3 +303,37 @@ def test_target__has_four_levels(resolution: int, sizes: list[int]) -> None:
     target = RefitTarget.of(Silhouette(np.eye(3, dtype=bool)), resolution)
     assert [len(picture.coverage) for picture in target.pictures] == sizes
     assert target.resolution == resolution
+
+
+@settings(max_examples=20)
+@given(meshes(), st.integers(0, 999), st.sampled_from([THOROUGH, LOCAL]))
+def test_refit_best__is_the_best_refit_of_each_start_and_says_what_it_is_worth(
+    mesh: PolyMesh, seed: int, config: RefitConfig
+) -> None:
+    target, scored = target_of(SQUARE, 32), Target(coverage(SQUARE, 48))
+    starts = [mesh, *(mesh.with_vertices(shaken(mesh.vertices, seed + k, 0.05)) for k in range(2))]
+    best = refit_best(starts, target, config, judge=Judge(scored, scored))
+    alone = [refit(start, target, config) for start in starts]
+    order = [(sum(defects_of(result.mesh)), result.loss) for result in alone]
+    assert (sum(defects_of(best.mesh)), best.loss) == min(order)
+    assert best.which == order.index(min(order))
+    assert best.mesh == alone[best.which].mesh and best.n_evaluations == alone[best.which].n_evaluations
+    assert best.mesh.defects == PolyMesh(*alone[best.which].mesh.__reduce__()[1]).defects  # counted anew
+    assert iou_of(best.overlap, scored) == intersection_over_union(best.mesh, scored)
+    assert best.n_hairlines == hairlines(best.mesh, scored)
+
+
+def test_refit_best__under_a_rule_prefers_what_keeps_it() -> None:
+    dart = PolyMesh.from_faces([(0.3, 0.3), (0.7, 0.3), (0.4, 0.4), (0.3, 0.7)], [(0, 1, 2, 3)])
+    convex = dart.with_vertices([(0.3, 0.3), (0.7, 0.3), (0.6, 0.6), (0.3, 0.7)])
+    target = target_of(dart, 32)
+    best = refit_best([dart, convex], target, LOCAL, faces="quads")
+    assert best.which == 1 and not broken_faces(best.mesh, "quads")
+    assert refit_best([dart, convex], target, LOCAL).which == 0
+
+
+def test_refit_best__leaves_out_starts_that_are_not_finite() -> None:
+    broken = SQUARE.with_vertices(np.full((5, 2), np.nan))
+    assert refit_best([broken, SQUARE], target_of(SQUARE, 32)).which == 1
+    with pytest.raises(MeshError, match="not finite"):
+        refit_best([broken, broken], target_of(SQUARE, 32))
