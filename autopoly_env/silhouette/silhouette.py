@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from autopoly_env.arguments import whole
-from autopoly_env.arrays import AnyArray, BoolArray, FloatArray, read_only
+from autopoly_env.arrays import BoolArray, FloatArray, read_only
 from autopoly_env.errors import SilhouetteError
 from autopoly_env.silhouette import cleaning, object_mask, target_kernels
 from autopoly_env.silhouette.connectivity import is_slanting_line
@@ -29,7 +29,8 @@ SMALL = 64  # pixels a side; a smaller picture has too few pixels to tell shapes
 class Target:
     """A silhouette at resolution R, with what the rasteriser and the score read off it.
 
-    Only `coverage` is given, everything else follows from it; all arrays are C-contiguous and read-only:
+    Only `coverage` is given, everything else follows from it, when it is asked for; all arrays are C-contiguous and
+    read-only:
 
     - `coverage` (R, R) float64 in 0..1: the share of each cell that is object.
     - `mask` (R, R) bool: coverage >= 0.5.
@@ -48,29 +49,50 @@ class Target:
     coverage: FloatArray
     weights: FloatArray | None = None
     by_area: bool = False
-    mask: BoolArray = field(init=False)
-    row_sum: FloatArray = field(init=False)
-    row_square_sum: FloatArray = field(init=False)
-    mask_sum: FloatArray = field(init=False)
-    n_filled: float = field(init=False)
-    weight_sum: FloatArray | None = field(init=False)
 
     def __post_init__(self) -> None:
         coverage = np.array(self.coverage, dtype=np.float64, order="C")
         if coverage.ndim != 2 or coverage.shape[0] != coverage.shape[1] or coverage.size == 0:
             raise SilhouetteError(f"coverage has shape {coverage.shape}; expected a square (R, R): pad it")
-        coverage = read_only(coverage)  # before kernels see it, which take what is writable for another type
-        weights = None if self.weights is None else read_only(np.rint(self.weights * WEIGHT_STEPS) / WEIGHT_STEPS)
-        among = _NO_WEIGHTS if weights is None else weights
-        row_sum, row_square_sum, weight_sum = target_kernels.row_sums(coverage, among)
-        mask, mask_sum, n_filled = target_kernels.filled_sums(coverage, among)
-        self._set(coverage=coverage, mask=mask, row_sum=row_sum, row_square_sum=row_square_sum, mask_sum=mask_sum)
-        self._set(weights=weights, weight_sum=None if weights is None else weight_sum)
-        object.__setattr__(self, "n_filled", int(n_filled) if weights is None else float(n_filled))
+        object.__setattr__(self, "coverage", read_only(coverage))
+        if self.weights is not None:
+            object.__setattr__(self, "weights", read_only(np.rint(self.weights * WEIGHT_STEPS) / WEIGHT_STEPS))
 
-    def _set(self, **arrays: AnyArray | None) -> None:
-        for name, array in arrays.items():
-            object.__setattr__(self, name, None if array is None else read_only(array))
+    @cached_property
+    def _row_sums(self) -> tuple[FloatArray, ...]:
+        among = _NO_WEIGHTS if self.weights is None else self.weights
+        return tuple(map(read_only, target_kernels.row_sums(self.coverage, among)))
+
+    @cached_property
+    def _filled(self) -> tuple[BoolArray, FloatArray, float]:
+        is_weighted = self.weights is not None
+        among = self.weights if is_weighted else _NO_WEIGHTS
+        mask, mask_sum, n_filled = target_kernels.filled_sums(self.coverage, among)
+        return read_only(mask), read_only(mask_sum), float(n_filled) if is_weighted else int(n_filled)
+
+    @property
+    def row_sum(self) -> FloatArray:
+        return self._row_sums[0]
+
+    @property
+    def row_square_sum(self) -> FloatArray:
+        return self._row_sums[1]
+
+    @property
+    def weight_sum(self) -> FloatArray | None:
+        return None if self.weights is None else self._row_sums[2]
+
+    @property
+    def mask(self) -> BoolArray:
+        return self._filled[0]
+
+    @property
+    def mask_sum(self) -> FloatArray:
+        return self._filled[1]
+
+    @property
+    def n_filled(self) -> float:
+        return self._filled[2]
 
     @property
     def resolution(self) -> int:

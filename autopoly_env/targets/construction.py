@@ -6,21 +6,20 @@ here every counted action shows in the outline, and all that shows is wide enoug
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import HoleChoice, preset
-from autopoly_env.placement.blame_kernels import regions_of
-from autopoly_env.raster import coverage
+from autopoly_env.operators import preset
+from autopoly_env.raster import coverage, workspace
 from autopoly_env.score import ScoreWeights, score
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import Silhouette
+from autopoly_env.targets.construction_kernels import shows_all
 from autopoly_env.targets.dice import Dice
-from autopoly_env.targets.growth import OUTLINE_OPERATORS, Grown, grow
+from autopoly_env.targets.growth import OUTLINE_OPERATORS, Growth, grow
 
 SALT = 1
 MAX_DIFFICULTY = 10
@@ -72,13 +71,12 @@ class ConstructionTargets:
 
         Raises ConfigError for another seed, and where the operators give no shape of the difficulty.
         """
-        _, steps = self._construct(seed)
-        return self._silhouette(seed, steps[-1].mesh)
+        return self._silhouette(seed, self._construct(seed).last)
 
     def sample_sequence(self, seed: int) -> ConstructionSequence:
         """How the shape of this seed was made, scored against it; the last mesh renders exactly as `sample` shows."""
-        start, steps = self._construct(seed)
-        silhouette = self._silhouette(seed, steps[-1].mesh)
+        growth = self._construct(seed)
+        silhouette = self._silhouette(seed, growth.last)
         target = silhouette.target(self.resolution)
         settings = {
             "target": silhouette.name,
@@ -90,13 +88,13 @@ class ConstructionTargets:
         def scored(mesh: PolyMesh) -> dict[str, float]:
             return score(mesh, target, SYNTHETIC_WEIGHTS).as_dict()
 
-        transitions = [(*step, scored(step.mesh)) for step in steps]
-        return ConstructionSequence.record(settings, start, scored(start), transitions)
+        transitions = [(*step, scored(step.mesh)) for step in growth.told()]
+        return ConstructionSequence.record(settings, growth.first, scored(growth.first), transitions)
 
     def _silhouette(self, seed: int, mesh: PolyMesh) -> Silhouette:
         return Silhouette(coverage(mesh, self.resolution) >= 0.5, f"{self.name}_{seed}")
 
-    def _construct(self, seed: int) -> tuple[PolyMesh, list[Grown]]:
+    def _construct(self, seed: int) -> Growth:
         """The rectangle and the steps from it, all in the picture."""
         dice = Dice(SALT, seed)
         least, most = self._range()
@@ -104,7 +102,7 @@ class ConstructionTargets:
         operators = self._operators()
         for _ in range(N_CONSTRUCTIONS):
             grown = grow(dice, operators, n_changes)
-            placed = grown and _placed(*grown, dice.between(*SIDE))
+            placed = grown and _placed(grown, dice.between(*SIDE))
             if placed:
                 return placed
         raise ConfigError(
@@ -113,34 +111,23 @@ class ConstructionTargets:
         )
 
 
-def _placed(start: PolyMesh, steps: list[Grown], side: float) -> tuple[PolyMesh, list[Grown]] | None:
+def _placed(growth: Growth, side: float) -> Growth | None:
     """The construction scaled and moved so that the last shape is centred, the longer side of its box being `side`.
 
     It gets smaller to keep the earlier shapes in the picture and its area in bounds; None if that is too small.
     """
-    final = steps[-1].mesh
+    final = growth.last
     low, high = final.vertices.min(axis=0), final.vertices.max(axis=0)
     centre, extent, area = 0.5 * (low + high), float((high - low).max()), float(final.face_areas().sum())
-    reach = max(float(np.abs(mesh.vertices - centre).max()) for mesh in (start, *(step.mesh for step in steps)))
+    reach = max(float(np.abs(places - centre).max()) for places in (growth.start, growth.places))
     scale = min(side / extent, np.sqrt(AREA[1] / area), (0.5 - BORDER) / reach)
     if scale * extent < MIN_SIDE or scale**2 * area < AREA[0]:
         return None
-
-    def put(points: FloatArray) -> FloatArray:
-        return 0.5 + scale * (points - centre)
-
-    placed = []
-    for action, choice, mesh in steps:
-        if isinstance(choice, HoleChoice):
-            choice = replace(choice, points=tuple((x, y) for x, y in put(np.array(choice.points)).tolist()))
-        placed.append(Grown(action, choice, mesh.with_vertices(put(mesh.vertices))))
-    if not _shows_all(placed[-1].mesh):
-        return None
-    return start.with_vertices(put(start.vertices)), placed
+    placed = growth.put(scale, centre)
+    return placed if _shows_all(placed.last) else None
 
 
 def _shows_all(mesh: PolyMesh) -> bool:
     """Whether a small picture of the mesh has all its parts and holes, and no other."""
-    inside = coverage(mesh, SMALL) >= 0.5
-    _, n_regions = regions_of(np.where(inside, 1.0, -1.0), 0.0)
-    return bool(n_regions == mesh.topology.n_components + mesh.topology.n_holes + 1)
+    work = workspace(SMALL, len(mesh.topology.boundary_half_edges))
+    return bool(shows_all(mesh.vertices, mesh.topology.packed, work, np.empty((SMALL, SMALL))))

@@ -1,9 +1,11 @@
 """Numba kernels that say whether a random shape can be shown: what is how far apart, and whether faces overlap."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from autopoly_env.arrays import FloatArray, IntArray
-from autopoly_env.compute import kernel
+from autopoly_env.compute import kernel, uncounted_kernel
 from autopoly_env.mesh.geometry_kernels import orientation
 from autopoly_env.mesh.topology_kernels import links_in
 from autopoly_env.raster.raster_kernels import Workspace, coverage_image
@@ -11,15 +13,21 @@ from autopoly_env.raster.raster_kernels import Workspace, coverage_image
 _SLACK = 1e-9  # by which a pixel's coverage may round to more than all of it
 
 
+class Limits(NamedTuple):
+    """What is asked of a shape, in extents, the longer side of its box."""
+
+    area: float  # at least, in square extents
+    gap: float  # of `is_clear`, as the others
+    length: float
+    bend: float
+    cosine: float
+
+
 @kernel
-def is_sound(
-    points: FloatArray, packed: IntArray, area: float, gap: float, length: float, bend: float, cosine: float,
-    work: Workspace, image: FloatArray,
-) -> bool:  # fmt: skip
+def is_sound(points: FloatArray, packed: IntArray, limits: Limits, work: Workspace, image: FloatArray) -> bool:
     """Whether nothing crosses, overlaps or is flipped, and all that there is can be seen.
 
-    `packed` is the topology. The shape has at least `area`, in squares of its extent, the longer side of its box;
-    lengths are in extents, too (`is_clear`). `image` (R, R), a picture that shows whether faces overlap, is scratch.
+    `packed` is the topology. `image` (R, R), a picture that shows whether faces overlap, is scratch.
     """
     links = links_in(packed)
     low_x, low_y, high_x, high_y = np.inf, np.inf, -np.inf, -np.inf
@@ -36,9 +44,10 @@ def is_sound(
         if not double > 0.0:
             return False
         covered += 0.5 * double
-    if covered < area * extent**2:
+    if covered < limits.area * extent**2:
         return False
-    if not is_clear(points, links.edges, links.boundary, gap * extent, length * extent, bend * extent, cosine):
+    gap, length, bend = limits.gap * extent, limits.length * extent, limits.bend * extent
+    if not is_clear(points, links.edges, links.boundary, gap, length, bend, limits.cosine):
         return False
     placed = np.empty((len(points), 2))
     for v in range(len(points)):
@@ -49,6 +58,51 @@ def is_sound(
             if image[row, column] > 1.0 + _SLACK:
                 return False
     return True
+
+
+@kernel
+def shows_all(points: FloatArray, packed: IntArray, work: Workspace, image: FloatArray) -> bool:
+    """Whether a picture of the shape, for which `image` (R, R) is scratch, has all its parts and holes, and no other.
+
+    Of an outline that passes no vertex twice each loop is that of a part or of a hole.
+    """
+    links = links_in(packed)
+    coverage_image(points, links.boundary, len(image), work, image)
+    return n_regions(image) == len(links.loop_ends) + 1
+
+
+@kernel
+def n_regions(image: FloatArray) -> int:
+    """How many 4-connected regions of pixels there are that are all covered by half or more, or all by less."""
+    size = len(image)
+    parents, labels = np.empty(size * size, np.int64), np.empty(size, np.int64)  # of the pixels of the last row
+    n_labels, n_joined = 0, 0
+    for row in range(size):
+        for column in range(size):
+            inside = image[row, column] >= 0.5
+            label = -1
+            if row > 0 and (image[row - 1, column] >= 0.5) == inside:
+                label = _root(parents, labels[column])
+            if column > 0 and (image[row, column - 1] >= 0.5) == inside:
+                left = _root(parents, labels[column - 1])
+                if label >= 0 and label != left:
+                    parents[label] = left
+                    n_joined += 1
+                label = left
+            if label < 0:
+                label = n_labels
+                parents[label] = label
+                n_labels += 1
+            labels[column] = label
+    return n_labels - n_joined
+
+
+@uncounted_kernel
+def _root(parents: IntArray, label: int) -> int:
+    while parents[label] != label:
+        parents[label] = parents[parents[label]]
+        label = parents[label]
+    return label
 
 
 @kernel

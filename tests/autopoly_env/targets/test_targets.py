@@ -10,11 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+from hypothesis import given
+from hypothesis import strategies as st
 from PIL import Image
 from skimage.measure import label
 
 from autopoly_env.errors import AutoPolyError, ConfigError, SilhouetteError
 from autopoly_env.mesh import PolyMesh, defects_of, is_valid
+from autopoly_env.operators import preset
 from autopoly_env.raster import coverage
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.silhouette import Silhouette
@@ -26,9 +29,12 @@ from autopoly_env.targets import (
     FolderTargets,
     ObjectTargets,
     TargetSource,
+    growth,
     make_targets,
     split_seed,
 )
+from autopoly_env.targets.construction_kernels import n_regions
+from autopoly_env.targets.dice import Dice
 from autopoly_env.targets.families import FAMILIES, FAMILIES_V0, Family
 from autopoly_env.targets.growth import OUTLINE_OPERATORS
 from autopoly_env.targets.pencil import box
@@ -36,6 +42,7 @@ from docs import draw_targets
 from tests.helpers.paths import ROOT
 
 N_EACH = 25  # constructions of every difficulty; 200 and more in all
+FULL = tuple(operator.name for operator in preset("full"))
 THINGS = {name: ObjectTargets((name,)) for name in FAMILIES}
 
 
@@ -495,3 +502,41 @@ def test_documentation__counts_the_families_and_shows_the_pictures() -> None:
     text = (draw_targets.PICTURES.parent / "targets.md").read_text(encoding="utf-8")
     assert f"{len(FAMILIES)} families" in text
     assert all(f"(pictures/{path.name})" in text for path in draw_targets.PICTURES.glob("targets_*.png"))
+
+
+# --- the kernels of growth, and the draws
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.3, 0.5, 0.7]))
+def test_regions__are_those_that_scikit_image_labels(seed: int, share: float) -> None:
+    image = (np.random.default_rng(seed).random((24, 24)) < share).astype(float)
+    assert n_regions(image) == label(image, background=-1, connectivity=1).max()
+
+
+def test_dice__give_the_same_numbers_however_they_are_asked_for() -> None:
+    one, other = Dice(3, 7), Dice(3, 7)
+    ahead = one.ahead(2000)
+    assert len(ahead) >= 2000 and (ahead[:700] == one.use(700)).all()
+    assert [other.between(0.0, 1.0) for _ in range(699)] == ahead[:699].tolist()
+    other.skip(1)
+    assert one.between(0.0, 1.0) == other.between(0.0, 1.0) == ahead[700]
+    assert (one.array(3, 2) == 2.0 * ahead[701:707].reshape(3, 2) - 1.0).all()
+    assert (ahead == np.random.default_rng([3, 7]).random(len(ahead))).all()
+
+
+@pytest.mark.parametrize("difficulty", [3, 10])
+def test_growth__is_the_same_however_many_numbers_are_drawn_ahead(
+    difficulty: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = ConstructionTargets(difficulty, "full")
+    before = [source.sample_sequence(seed) for seed in range(12)]
+    monkeypatch.setattr(growth, "_N_DRAWS", 8)
+    assert [source.sample_sequence(seed) for seed in range(12)] == before
+
+
+def test_growth__is_told_by_the_operators_as_the_kernel_did_it() -> None:
+    for seed in range(40):
+        grown = growth.grow(Dice(1, seed), FULL, 4)
+        if grown is not None:
+            *_, last = grown.told()
+            assert last.mesh.faces == grown.last.faces and (last.mesh.vertices == grown.last.vertices).all()
