@@ -15,7 +15,7 @@ from autopoly_env.compute import Routine, run
 from autopoly_env.errors import ConfigError, EpisodeError, IllegalActionError
 from autopoly_env.mesh import FACE_RULES, PolyMesh, validate
 from autopoly_env.observation import Observation, Observer
-from autopoly_env.operators import Action, ActionCodec, describe
+from autopoly_env.operators import Action, ActionCodec, describe, preset
 from autopoly_env.score import ScoreWeights
 from autopoly_env.silhouette import Silhouette, load_silhouette
 from autopoly_env.simulator import Simulator, State
@@ -167,7 +167,7 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
         self._source = _Source(self.targets)
         self._seeds = SPLITS[one_of("split", split, tuple(SPLITS))]
         self._simulator_settings: dict[str, Any] = {
-            "operators": operators,
+            "operators": preset(operators),
             "resolution": whole("resolution", resolution),
             "weights": ScoreWeights(number("w_sm", w_sm), number("w_sc", w_sc), number("w_si", w_si)),
             "max_steps": whole("max_steps", max_steps, 1, 2**31 - 1),

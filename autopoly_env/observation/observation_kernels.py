@@ -1,22 +1,20 @@
 """A Numba kernel that writes an observation: the picture of a mesh and its padded arrays, in one call.
 
-Letters: R pixels a side, V vertices, B directed boundary edges, E edges, H corners; the arrays' sizes are fixed.
+Letters: R pixels a side, V vertices, E edges, F faces, H corners; the arrays' sizes are fixed.
 """
 
 import numpy as np
 
 from autopoly_env.arrays import ByteArray, Float32Array, FloatArray, Int32Array, IntArray
-from autopoly_env.compute import uncounted_kernel
+from autopoly_env.compute import kernel
+from autopoly_env.mesh.topology_kernels import links_in
 from autopoly_env.raster.raster_kernels import Workspace, coverage_image
 
 
-@uncounted_kernel
+@kernel
 def observe(
     points: FloatArray,
-    boundary: IntArray,
-    edges: IntArray,
-    owners: IntArray,
-    corners: IntArray,
+    packed: IntArray,
     low: float,
     high: float,
     padding: int,
@@ -26,13 +24,16 @@ def observe(
     places: Float32Array,
     edge_rows: Int32Array,
     corner_rows: Int32Array,
+    counts: Int32Array,
 ) -> None:
-    """Write the picture (1, R, R) of `boundary` (B, 2), and `points`, `edges`, and `corners` (H,) with their `owners`.
+    """Write the picture (1, R, R) of a mesh, its points, its edges, its corners with their faces, and V, E, F, H.
 
     `image` (R, R) is scratch. Positions are clipped to `low`..`high`; rows without an element are `padding`.
     """
+    links = links_in(packed)
+    edges, owners, corners = links.edges, links.owners, links.corners
     size = image.shape[0]
-    coverage_image(points, boundary, size, work, image)
+    coverage_image(points, links.boundary, size, work, image)
     for row in range(size):
         for column in range(size):
             share = min(max(image[row, column], 0.0), 1.0)
@@ -47,3 +48,4 @@ def observe(
     corner_rows[:] = padding
     for h in range(len(corners)):
         corner_rows[2 * h], corner_rows[2 * h + 1] = owners[h], corners[h]
+    counts[0], counts[1], counts[2], counts[3] = len(points), len(edges), len(links.offsets) - 1, len(corners)

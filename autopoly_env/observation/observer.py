@@ -20,7 +20,7 @@ PADDING = -1  # of rows without an element
 POSITION_RANGE = (-1.0, 2.0)  # positions are clipped to it; the unit square lies in its middle
 
 Observation = dict[str, AnyArray]
-_WRITTEN = ("rendering", "vertices", "edges", "faces")
+_WRITTEN = ("rendering", "vertices", "edges", "faces", "counts")
 
 
 @dataclass(frozen=True)
@@ -53,6 +53,7 @@ class Observer:
             "counts": Field((4,), np.int32, 0, n_corners),
             "remaining_steps": Field((1,), np.int32, 0, max_steps),
         }
+        self._written = [(self.fields[name].shape, np.dtype(self.fields[name].dtype)) for name in _WRITTEN]
 
     def picture_of(self, silhouette: Silhouette) -> ByteArray:
         """The target as a picture (1, R, R)."""
@@ -60,16 +61,12 @@ class Observer:
 
     def observe(self, mesh: PolyMesh, target: ByteArray, remaining_steps: int) -> Observation:
         """New arrays of what there is to see; `target` is what `picture_of` gives."""
-        topology = mesh.topology
-        boundary, corners = topology.boundary_half_edges, topology.corners
-        size = self._resolution
-        rendering, vertices, edges, faces = (
-            np.empty(self.fields[name].shape, self.fields[name].dtype) for name in _WRITTEN
-        )
+        size, packed = self._resolution, mesh.topology.packed
+        rendering, vertices, edges, faces, counts = (np.empty(shape, dtype) for shape, dtype in self._written)
+        work = workspace(size, len(mesh.topology.boundary_half_edges))
         observation_kernels.observe(
-            *(mesh.vertices, boundary, topology.edges, topology.half_edge_face, corners),
-            *(*POSITION_RANGE, PADDING, workspace(size, len(boundary)), np.empty((size, size))),
-            *(rendering, vertices, edges, faces),
+            *(mesh.vertices, packed, *POSITION_RANGE, PADDING, work, np.empty((size, size))),
+            *(rendering, vertices, edges, faces, counts),
         )
         return {
             "rendering": rendering,
@@ -77,7 +74,7 @@ class Observer:
             "vertices": vertices,
             "edges": edges,
             "faces": faces,
-            "counts": np.array((*mesh.counts, len(corners)), np.int32),
+            "counts": counts,
             "remaining_steps": np.array((remaining_steps,), np.int32),
         }
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from autopoly_env.arrays import FloatArray, IntArray
 from autopoly_env.compute import kernel, uncounted_kernel
+from autopoly_env.mesh.topology_kernels import links_in
 from autopoly_env.raster.raster_kernels import Workspace, coverage_image
 
 MASS, FAR_X, FAR_Y, LOW, HIGH, DEPTH = range(6)
@@ -14,15 +15,16 @@ AREA, DEEP_X, DEEP_Y, RADIUS, MEAN_X, MEAN_Y, VAR_X, VAR_Y, COV_XY = range(9)
 
 
 @kernel
-def difference_of(
-    points: FloatArray, boundary: IntArray, target: FloatArray, weights: FloatArray, threshold: float, work: Workspace
-) -> tuple[FloatArray, IntArray, int]:
-    """(R, R) the target's coverage less that of the mesh, its regions as `regions_of` labels them, and their number.
+def disagreement_of(
+    points: FloatArray, packed: IntArray, target: FloatArray, weights: FloatArray, threshold: float, work: Workspace
+) -> tuple[FloatArray, IntArray, int, FloatArray]:
+    """(R, R) the target's coverage less that of the mesh, its regions as `regions_of` labels them, their number L, and
+    which edges of the boundary are to blame, as `blame_edges` says.
 
-    `boundary` (B, 2) are the mesh's directed edges. Where `weights` (R, R) are not empty, pixels of weight 0 do not
+    `packed` is the mesh's topology. Where `weights` (R, R) are not empty, pixels of weight 0 do not
     disagree, and the difference of the others counts as much as they weigh.
     """
-    size = len(target)
+    size, boundary = len(target), links_in(packed).boundary
     difference = np.empty((size, size))
     coverage_image(points, boundary, size, work, difference)
     for row in range(size):
@@ -34,7 +36,7 @@ def difference_of(
     for row in range(len(weights)):
         for column in range(size):
             difference[row, column] *= weights[row, column]
-    return difference, labels, n_labels
+    return difference, labels, n_labels, blame_edges(points, boundary, difference, labels, n_labels)
 
 
 @kernel

@@ -31,13 +31,13 @@ class Disagreement:
         self._silhouette = silhouette
 
     @cached_property
-    def _found(self) -> tuple[FloatArray, IntArray, int]:
+    def _found(self) -> tuple[FloatArray, IntArray, int, FloatArray]:
         """Only where an operator asks: many actions do not depend on it."""
-        target, edges = self._silhouette.target(RESOLUTION), self.mesh.topology.boundary_half_edges
+        target, topology = self._silhouette.target(RESOLUTION), self.mesh.topology
         weights = NO_WEIGHTS if target.weights is None else target.weights
-        work = workspace(RESOLUTION, len(edges))
-        found: tuple[FloatArray, IntArray, int] = blame_kernels.difference_of(
-            self.mesh.vertices, edges, target.coverage, weights, THRESHOLD, work
+        work = workspace(RESOLUTION, len(topology.boundary_half_edges))
+        found: tuple[FloatArray, IntArray, int, FloatArray] = blame_kernels.disagreement_of(
+            self.mesh.vertices, topology.packed, target.coverage, weights, THRESHOLD, work
         )
         return found
 
@@ -66,14 +66,10 @@ class Disagreement:
         """L, of connected pixels in which the two disagree."""
         return self._found[2]
 
-    @cached_property
+    @property
     def blame(self) -> FloatArray:
         """(B, 2, 6) see `blame_kernels.blame_edges`; rows as `Topology.boundary_half_edges`."""
-        edges = self.mesh.topology.boundary_half_edges
-        table: FloatArray = blame_kernels.blame_edges(
-            self.mesh.vertices, edges, self.difference, self.labels, self.n_regions
-        )
-        return table
+        return self._found[3]
 
     @cached_property
     def row_of_edge(self) -> dict[int, int]:
