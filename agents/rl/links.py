@@ -74,7 +74,7 @@ def _edges(
 
 def taken(rows: Tensor, index: Tensor) -> Tensor:
     """rows (K, D) at index (H,): (H, D)."""
-    return rows.gather(0, index[:, None].expand(-1, rows.shape[1]))
+    return rows.index_select(0, index)
 
 
 def summed(rows: Tensor, index: Tensor, n: int) -> Tensor:

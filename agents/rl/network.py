@@ -118,13 +118,12 @@ class MeshEncoder(nn.Module):
     def _read(self, pictures: Tensor, maps: Tensor, vertices: Tensor, links: Links) -> Tensor:
         """(H, n_read) what the half-edges see and what shape they have."""
         frame = reading.frame_of(vertices, links)
-        near = reading.read(pictures, reading.near_points(frame), links.batch).flatten(1)
-        around = torch.cat((functional.avg_pool2d(pictures, 4), maps), 1)
-        wide = reading.read(around, reading.wide_points(frame), links.batch)
-        far, inner = wide[..., 2:].split((reading.N_FAR, reading.N_INNER), 1)
-        return torch.cat(
-            (near, wide[..., :2].flatten(1), far.mean(1), inner.mean(1), reading.shape_values(frame, links)), -1
-        )
+        wide = reading.wide_points(frame)
+        near = reading.read_pictures(pictures, reading.near_points(frame), links.homes["corner"])
+        coarse = reading.read_pictures(functional.avg_pool2d(pictures, 4), wide, links.homes["corner"])
+        around = reading.read_mean(maps, wide.unflatten(1, (2, -1)), links.batch)  # far outside, then inside
+        seen = (near, coarse, around)
+        return torch.cat((*(some.flatten(1) for some in seen), reading.shape_values(frame, links)), -1)
 
     def _facts(self, observation: Mapping[str, Tensor], pictures: Tensor) -> Tensor:
         """(B, N_FACTS) counts, steps left, price of an element, and how far rendering and target agree."""

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import torch
 from torch import Tensor
+from torch.nn import functional
 
-from agents.rl.links import Links, averaged, summed, taken
+from agents.rl.links import Links, averaged, summed
 
 N_ALONG = 6  # points along a half-edge, at each of the near offsets
 NEAR = (-4.0 / 64, -1.5 / 64, 1.5 / 64, 4.0 / 64)  # unit square, outwards
@@ -63,23 +64,42 @@ def _along(frame: Frame, n: int) -> Tensor:
     return frame.begin[:, None] + share[:, None] * frame.step[:, None]
 
 
-def read(maps: Tensor, points: Tensor, batch: Tensor) -> Tensor:
-    """(H, P, C) maps (B, C, R, R), of mesh `batch` (H,), at points (H, P, 2), unit square; bilinear, 0 outside."""
-    size = maps.shape[-1]
+def read_mean(maps: Tensor, points: Tensor, batch: Tensor) -> Tensor:
+    """(H, G, C) maps (B, C, R, R), of mesh `batch` (H,), the mean over groups of points (H, G, P, 2), unit square.
+
+    Bilinear, 0 outside: a bag of four pixels for every point, which takes a CPU half the time of gathering them.
+    """
+    size, n_points = maps.shape[-1], points.shape[2]
     rows = maps.permute(0, 2, 3, 1).reshape(-1, maps.shape[1])
     at = points * size - 0.5
     low = at.floor()
     share = at - low
     x, y = low.long().unbind(-1)
-    base = batch[:, None] * (size * size)
-    found = torch.zeros((), device=maps.device)
+    base = batch[:, None, None] * (size * size)
+    pixels, weights = [], []
     for dx, wx in ((0, 1.0 - share[..., 0]), (1, share[..., 0])):
         for dy, wy in ((0, 1.0 - share[..., 1]), (1, share[..., 1])):
             column, row = x + dx, y + dy
             inside = (column >= 0) & (column < size) & (row >= 0) & (row < size)
-            index = base + row.clamp(0, size - 1) * size + column.clamp(0, size - 1)
-            found = found + taken(rows, index.flatten()) * (wx * wy * inside).flatten()[:, None]
+            pixels.append(base + row.clamp(0, size - 1) * size + column.clamp(0, size - 1))
+            weights.append(wx * wy * inside / n_points)
+    bags, shares = (torch.cat(some, -1).flatten(0, 1) for some in (pixels, weights))
+    found = functional.embedding_bag(bags, rows, per_sample_weights=shares.to(rows.dtype), mode="sum")
     return found.unflatten(0, points.shape[:2])
+
+
+def read_pictures(pictures: Tensor, points: Tensor, home: tuple[Tensor, Tensor]) -> Tensor:
+    """(H, P, C) pictures (B, C, R, R) at points (H, P, 2), unit square; bilinear, 0 outside.
+
+    `home` is the mesh (H,) of each half-edge and its number (H,) there. Those of a mesh are read in a row, padded: the
+    quickest where nothing is learnt about what is read.
+    """
+    batch, number = home
+    n = int(number.max()) + 1 if len(number) else 1
+    grid = points.new_full((len(pictures), n, *points.shape[1:]), 2.0)  # outside
+    grid[batch, number] = 2.0 * points - 1.0
+    found = functional.grid_sample(pictures, grid.to(pictures.dtype), align_corners=False)
+    return found.permute(0, 2, 3, 1)[batch, number]
 
 
 def shape_values(frame: Frame, links: Links) -> Tensor:

@@ -154,8 +154,23 @@ def test_sums_and_means__go_by_index() -> None:
 def test_reading__is_bilinear_and_nothing_outside() -> None:
     ramp = torch.arange(4.0).expand(1, 1, 4, 4)
     points = torch.tensor([[[0.125, 0.5], [0.5, 0.5], [0.75, 0.2], [2.0, 0.5], [-1.0, 0.5]]])
-    found = reading.read(ramp, points, torch.tensor([0]))
-    assert found[0, :, 0].tolist() == pytest.approx([0.0, 1.5, 2.5, 0.0, 0.0])
+    here = torch.zeros(1, dtype=torch.long)
+    expected = [0.0, 1.5, 2.5, 0.0, 0.0]
+    assert reading.read_pictures(ramp, points, (here, here))[0, :, 0].tolist() == pytest.approx(expected)
+    groups = points[:, [0, 1, 2, 3, 4, 1]].unflatten(1, (3, 2))
+    assert reading.read_mean(ramp, groups, here)[0, :, 0].tolist() == pytest.approx([0.75, 1.25, 0.75])
+    assert reading.read_mean(ramp, points[:, :, None], here)[0, :, 0].tolist() == pytest.approx(expected)
+
+
+def test_reading__of_several_meshes_takes_each_from_its_own_picture() -> None:
+    pictures = torch.tensor([1.0, 2.0, 3.0])[:, None, None, None].expand(3, 1, 4, 4).contiguous().requires_grad_()
+    points, batch = torch.full((4, 1, 2), 0.5), torch.tensor([0, 2, 2, 1])
+    home = batch, torch.tensor([0, 0, 1, 0])
+    assert reading.read_pictures(pictures, points, home).flatten().tolist() == [1, 3, 3, 2]
+    found = reading.read_mean(pictures, points[:, :, None], batch)
+    assert found.flatten().tolist() == [1, 3, 3, 2]
+    (slopes,) = torch.autograd.grad(found.sum(), pictures)
+    assert slopes.sum((1, 2, 3)).tolist() == [1, 1, 2] and (slopes[1, 0, 1:3, 1:3] == 0.25).all()
 
 
 def test_near_points__lie_on_both_sides_of_the_edge() -> None:
