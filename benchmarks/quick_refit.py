@@ -28,7 +28,7 @@ from autopoly_env.operators import Action
 from autopoly_env.placement import Disagreement
 from autopoly_env.raster import workspace
 from autopoly_env.refit import QUICK, THOROUGH, RefitConfig, RefitTarget, quick_resolution, refit_kernels
-from autopoly_env.refit.refitting import shape_arguments
+from autopoly_env.refit.refitting import NOBODY, shape_arguments
 from autopoly_env.silhouette import Silhouette, find_images, load_silhouette
 from autopoly_env.simulator import Simulator
 from autopoly_env.targets import make_targets, split_seed
@@ -68,12 +68,14 @@ def refitting(config: RefitConfig, share: float = 1.0, towards: Sequence[PolyMes
             shape = shape_arguments(case.mesh.topology, "any", None)
             room = workspace(target.resolution, len(case.mesh.topology.boundary_half_edges))
             aim = target.coverages, target.sums
-            calls.append((begin, *shape, *aim, *config.settings, room, np.empty_like(begin)))
+            calls.append(
+                (begin[None], *shape, *aim, *config.settings, *NOBODY.arguments, room, np.empty_like(begin[None]))
+            )
         began = time.process_time()
         for call in calls:
             refit_kernels.refit(*call)
         spent = time.process_time() - began
-        return [case.mesh.with_vertices(call[-1]) for case, call in zip(cases, calls, strict=True)], spent
+        return [case.mesh.with_vertices(call[-1][0]) for case, call in zip(cases, calls, strict=True)], spent
 
     return move
 
