@@ -19,7 +19,6 @@ from agents.solution import Solution
 from agents.trace.agent import TraceAgent, TraceConfig
 from agents.trace.outline import Outline
 from agents.trace.reach import Reach
-from agents.trace.rings import Ring
 from autopoly_env.arrays import FloatArray
 from autopoly_env.errors import ConfigError
 from autopoly_env.refit import LOCAL
@@ -97,11 +96,12 @@ def _coarser(outline: Outline, reach: Reach, n_most: int) -> Iterator[Outline]:
             areas += [(area, k, i) for i, area in enumerate(_spanned(ring.points).tolist())]
     for _, k, i in sorted(areas)[:n_most]:
         ring = outline.rings[k]
-        yield outline.with_ring(k, Ring(np.delete(ring.points, i, axis=0), ring.parent))
+        yield outline.with_ring(k, ring.without(i))
     yield from (outline.without_ring(k) for k in range(1, len(outline.rings)))
 
 
 def _spanned(points: FloatArray) -> FloatArray:
     """(n,) area of the triangle of each vertex and its two neighbours."""
-    u, v = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
+    u = points - np.concatenate((points[-1:], points[:-1]))
+    v = np.concatenate((points[1:], points[:1])) - points
     return 0.5 * np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from functools import cached_property
 
 from agents.trace.outline import Outline
 from agents.trace.reach import Reach
@@ -10,25 +10,29 @@ from agents.trace.rings import trace_rings
 from autopoly_env.compute import map_threads
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.refit import Judge, RefitConfig, refit
-from autopoly_env.score import Score, iou_of
+from autopoly_env.score import Score, iou_of, score_of
 from autopoly_env.simulator import Simulator
 
 LEAST_GAIN = 1e-9  # of r_all, below which a place is no better than another
 
 
-class Place(NamedTuple):
-    """An outline, and what it is worth."""
+class Place:
+    """An outline, and what it is worth; `total` is r_all less what is off it in choosing."""
 
-    outline: Outline
-    score: Score
+    def __init__(self, outline: Outline, loops: PolyMesh, score: Score, off: float) -> None:
+        """`loops` are the rings' places, of an outline that is moved there when it is asked for: most never are."""
+        self.score = replace(score, total=score.total - off) if off else score
+        self.total = self.score.total
+        self._outline, self._loops = outline, loops
 
-    @property
-    def total(self) -> float:
-        return self.score.total
+    @cached_property
+    def outline(self) -> Outline:
+        """The rings."""
+        return self._outline if self._outline.loops is self._loops else self._outline.moved(self._loops)
 
     def mesh(self) -> PolyMesh:
-        """Its rings."""
-        return self.outline.loops
+        """The rings as faces."""
+        return self._loops
 
 
 class Hill:
@@ -44,7 +48,7 @@ class Hill:
     def place(self, outline: Outline) -> Place:
         """The outline as it is; its total is less what is off it in choosing."""
         score = outline.score(self._pixels, self.simulator.weights)
-        return _placed(outline, score, self.simulator.off(outline.loops))
+        return Place(outline, outline.loops, score, self.simulator.off(outline.loops))
 
     def fit(self, outlines: Sequence[Outline], config: RefitConfig, iou: float) -> list[Place]:
         """Each outline refitted, on all cores, on the way to more than `iou`."""
@@ -52,9 +56,9 @@ class Hill:
 
         def fitted(outline: Outline) -> Place:
             fit = refit(outline.loops, target, config, judge=self._judge)
-            moved = outline.moved(fit.mesh)
-            score = moved.scored(iou_of(fit.overlap, self._pixels), self.simulator.weights)
-            return _placed(moved, score, self.simulator.off(fit.mesh, fit.n_hairlines))
+            iou = iou_of(fit.overlap, self._pixels)
+            score = score_of(fit.mesh, iou, self.simulator.weights, outline.complexity)
+            return Place(outline, fit.mesh, score, self.simulator.off(fit.mesh, fit.n_hairlines))
 
         return map_threads(fitted, outlines)
 
@@ -65,10 +69,6 @@ class Hill:
     def polished(self, place: Place) -> Place:
         """The outline refitted and tuned, as a finished mesh is."""
         return self.place(place.outline.moved(self.simulator.polish(place.outline.loops)))
-
-
-def _placed(outline: Outline, score: Score, off: float) -> Place:
-    return Place(outline, replace(score, total=score.total - off) if off else score)
 
 
 def total_of(place: Place) -> float:

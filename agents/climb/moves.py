@@ -26,7 +26,7 @@ def neighbours(
     disagreement = Disagreement(outline.loops, silhouette)
     for k, ring in enumerate(outline.rings):
         if len(ring.points) > 3:
-            yield from (outline.with_ring(k, _without(ring, i)) for i in range(len(ring.points)))
+            yield from (outline.with_ring(k, ring.without(i)) for i in range(len(ring.points)))
     for row in blamed_rows(disagreement, n_blamed):
         yield grown_at(outline, disagreement, row, "edge_subdivide")
         yield grown_at(outline, disagreement, row, "edge_extrude")
@@ -47,7 +47,7 @@ def relocations(outline: Outline, silhouette: Silhouette, n_blamed: int) -> Iter
             old_points = {tuple(p) for p in old.points}
             if len(new.points) > 4:
                 kept = (i for i in range(len(new.points)) if tuple(new.points[i]) in old_points)
-                yield from (grown.with_ring(k, _without(new, i)) for i in kept)
+                yield from (grown.with_ring(k, new.without(i)) for i in kept)
 
 
 def shaken(outline: Outline, silhouette: Silhouette, rng: np.random.Generator) -> Outline:
@@ -74,7 +74,7 @@ def _with_one_less(outline: Outline, rng: np.random.Generator) -> Outline:
     if not places:
         return outline
     k, i = places[int(rng.integers(len(places)))]
-    return outline.with_ring(k, _without(outline.rings[k], i))
+    return outline.with_ring(k, outline.rings[k].without(i))
 
 
 def blamed_rows(disagreement: Disagreement, n_most: int) -> list[int]:
@@ -82,10 +82,6 @@ def blamed_rows(disagreement: Disagreement, n_most: int) -> list[int]:
     blame = disagreement.blame[:, :, 0].max(axis=1)
     order = np.argsort(-blame, kind="stable")[:n_most]
     return [int(row) for row in order if blame[row] > 0.0]
-
-
-def _without(ring: Ring, index: int) -> Ring:
-    return Ring(np.delete(ring.points, index, axis=0), ring.parent)
 
 
 def grown_at(outline: Outline, disagreement: Disagreement, row: int, operator: str) -> Outline:

@@ -26,6 +26,10 @@ class Ring:
     def is_hole(self) -> bool:
         return self.parent >= 0
 
+    def without(self, index: int) -> "Ring":
+        """The ring with a point less."""
+        return Ring(np.concatenate((self.points[:index], self.points[index + 1 :])), self.parent)
+
     @cached_property
     def contour(self) -> Contour:
         """The ring as something to make polygons of."""
@@ -39,8 +43,8 @@ class Ring:
 
 def signed_area(points: FloatArray) -> float:
     """Shoelace area of a closed polygon (n, 2), positive as faces are wound."""
-    x, y = points.T
-    return float(0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1)))
+    (x, y), (next_x, next_y) = points.T, np.concatenate((points[1:], points[:1])).T
+    return float(0.5 * (x @ next_y - y @ next_x))
 
 
 def trace_rings(silhouette: Silhouette) -> list[Ring]:

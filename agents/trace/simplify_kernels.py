@@ -50,18 +50,19 @@ def chord_errors(points: FloatArray, longest: int) -> FloatArray:
     Infinite where a chord spans more than `longest` points.
     """
     n = points.shape[0]
-    errors = np.full((n, n + 1), np.inf)
+    errors, ring = np.full((n, n + 1), np.inf), np.empty((n + 1, 2))
+    ring[:n], ring[n] = points, points[0]  # for a remainder takes as long as the rest of a step
     for i in range(n):
         for j in range(i + 1, min(n, i + longest) + 1):
-            ax, ay = points[i, 0], points[i, 1]
-            dx, dy = points[j % n, 0] - ax, points[j % n, 1] - ay
+            ax, ay = ring[i, 0], ring[i, 1]
+            dx, dy = ring[j, 0] - ax, ring[j, 1] - ay
             length = np.sqrt(dx * dx + dy * dy)
             if length == 0.0:
                 continue
             dx, dy = dx / length, dy / length
             error, along, across = 0.0, 0.0, 0.0
             for k in range(i + 1, j + 1):
-                px, py = points[k % n, 0] - ax, points[k % n, 1] - ay
+                px, py = ring[k, 0] - ax, ring[k, 1] - ay
                 next_along, next_across = px * dx + py * dy, py * dx - px * dy
                 step, a, b = abs(next_along - along), abs(across), abs(next_across)
                 if across * next_across >= 0.0:
