@@ -32,6 +32,7 @@ from training.networks.command import (
     train_network,
 )
 from training.networks.finish import finish_run
+from training.networks.inherit import inherit
 from training.networks.metrics import mean_rows, nfap_metrics
 from training.networks.pictures import draw_nfap
 from training.networks.samples import LabelConfig
@@ -56,6 +57,7 @@ class TrainNfapConfig:
     """Everything that can be set."""
 
     net: NfapConfig = field(default_factory=NfapConfig)
+    begin: str = ""  # weights of an earlier nFAP-Net (.safetensors) to begin with; empty: begin anew
     data: DataConfig = field(default_factory=DataConfig)
     labels: LabelConfig = field(default_factory=LabelConfig)
     loss: NfapLossWeights = field(default_factory=NfapLossWeights)
@@ -77,7 +79,7 @@ class NfapLosses(nn.Module):
     def foresee(self, batch: Batch) -> Foresight:
         """What the network foresees, in half precision where the run wants it."""
         with self.run.half_precision(batch["pictures"].device):
-            foresight: Foresight = self.net(batch["pictures"])
+            foresight: Foresight = self.net(batch["pictures"], batch["told"])
         return foresight
 
     def terms(self, foresight: Foresight, batch: Batch) -> dict[str, Tensor]:
@@ -96,6 +98,8 @@ class NfapTask:
         torch.manual_seed(config.run.seed)
         self.config = config
         self.net = NfapNet(config.net)
+        if config.begin:
+            inherit(self.net, config.begin)
         self.losses = NfapLosses(self.net, config.loss, config.run)
         learn, test = config.data.trajectories()
         self.stream = NfapStream(learn, config.net, config.labels, config.run.seed)

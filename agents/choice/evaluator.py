@@ -11,10 +11,10 @@ import numpy as np
 from agents.choice.features import look, look_at_whole
 from agents.choice.network import batch_of, choose, gains
 from agents.choice.weights import ChoiceWeights
+from agents.knowing import Known
 from agents.search.evaluator import UniformEvaluator
 from autopoly_env.arrays import FloatArray
-from autopoly_env.errors import ConfigError
-from autopoly_env.operators import Action, operator_named
+from autopoly_env.operators import Action
 from autopoly_env.simulator import Simulator, State
 
 _FLOOR = 1e-4  # of the likeliest action, for all
@@ -26,26 +26,10 @@ class ChoiceEvaluator(UniformEvaluator):
     def __init__(self, weights: ChoiceWeights, temperature: float = 1.0) -> None:
         self._config, self._tensors, self._temperature = weights.config, weights.tensors, temperature
 
-    def check(self, simulator: Simulator) -> None:
-        """Raise ConfigError where the weights know nothing of the simulator's rule, price or any of its operators."""
-        low, high = self._config.w_sc
-        if simulator.faces not in self._config.rules:
-            known = ", ".join(self._config.rules)
-            raise ConfigError(f"these weights know faces={known}, not {simulator.faces}: give one of them, or others")
-        if not low <= simulator.weights.w_sc <= high:
-            raise ConfigError(
-                f"these weights know w_sc {low:g} to {high:g}, not {simulator.weights.w_sc:g}: give others"
-            )
-        if len(self.unknown(simulator)) == len(simulator.operators):
-            raise ConfigError(
-                f"these weights know {', '.join(self._config.classes)}, none of which is an operator here: give others"
-            )
-
-    def unknown(self, simulator: Simulator) -> list[str]:
-        """The simulator's operators that the weights do not know: their actions come last."""
-        return [
-            name for name in simulator.operators if not set(operator_named(name).classes) & set(self._config.classes)
-        ]
+    @property
+    def known(self) -> Known:
+        """What the weights may be asked about."""
+        return Known(self._config.classes, self._config.rules, self._config.w_sc)
 
     def prior(self, simulator: Simulator, state: State, actions: Sequence[Action]) -> FloatArray:
         return self.priors(simulator, [(state, actions)])[0]

@@ -10,6 +10,7 @@ from agents.base import Agent, Decision
 from agents.budget import Foresight, Meter
 from agents.extras import require
 from agents.guided.config import NfapMctsConfig, NfapPriorConfig
+from agents.knowing import KnowingAgent, Known
 from agents.search.mcts import MctsAgent
 from agents.solution import Track
 from autopoly_env.compute import n_threads
@@ -21,13 +22,21 @@ if TYPE_CHECKING:
     from agents.guided.evaluator import NfapEvaluator
 
 
-class NfapPriorAgent(MctsAgent):
+class NfapPriorAgent(KnowingAgent, MctsAgent):
     """Tree search with nFAP-Net's priors and exact refits."""
 
     name = "nfap-prior"
 
+    def __init__(self, config: NfapPriorConfig, incumbents: Sequence[Agent], evaluator: "NfapEvaluator") -> None:
+        super().__init__(config, incumbents, evaluator)
+        self._nfap = evaluator
 
-class NfapMctsAgent(Agent):
+    @property
+    def known(self) -> Known:
+        return self._nfap.known
+
+
+class NfapMctsAgent(KnowingAgent):
     """The paper's search with learning: a tree for every step, grown with the networks; the step itself is refitted."""
 
     name = "nfap-mcts"
@@ -36,8 +45,13 @@ class NfapMctsAgent(Agent):
         self._config, self._evaluator = config, evaluator
         self._searcher = MctsAgent(replace(config, seeds=()), (), evaluator)
 
+    @property
+    def known(self) -> Known:
+        return self._evaluator.known
+
     def act(self, simulator: Simulator, state: State) -> Decision:
         """Search a tree of its own from `state`; STOP where nothing in it is better, fitted as in the tree."""
+        self.known.check(simulator)
         return self._searcher.act(simulator, state)
 
     def _search(self, simulator: Simulator, track: Track, meter: Meter) -> Iterator[Track]:

@@ -9,6 +9,7 @@ from typing import Literal
 
 from agents.search.config import MctsConfig
 from autopoly_env.errors import ConfigError
+from autopoly_env.mesh import FaceRule
 from autopoly_env.operators import STOP, Action, operator_named
 
 Input = Literal["current", "target", "difference", "edges", "vertices"]
@@ -63,15 +64,36 @@ class NfapConfig:
     residual: bool = False  # the prior is a learned correction of the residual prior, not the networks' alone
     judge: bool = False  # a head looks at each action's own place and measures, and corrects what the regions say
     classes: tuple[str, ...] = CLASSES  # of actions, by name; "stop" first
+    rules: tuple[FaceRule, ...] = ()  # rules of faces that it is told and knows; none: it is not told the rule
+    w_sc: tuple[float, float] | None = None  # prices that it is told and knows, from and to; None: it is not told
 
     def __post_init__(self) -> None:
         if self.classes[:1] != ("stop",) or len(set(self.classes)) < len(self.classes):
             raise ConfigError(f"classes {', '.join(self.classes)}: expected stop first, and none twice")
+        if len(set(self.rules)) < len(self.rules):
+            raise ConfigError(f"rules {', '.join(self.rules)}: expected none twice")
+        if self.w_sc is not None and not 0.0 < self.w_sc[0] <= self.w_sc[1] < math.inf:
+            raise ConfigError(f"w_sc={self.w_sc}: expected two prices above 0, the lower first")
         _check_network(self.image_size, self.widths, self.feature)
         if not 1 <= self.n <= 16:
             raise ConfigError(f"n {self.n}: expected 1 to 16 stages")
         if not self.inputs or len(set(self.inputs)) < len(self.inputs):
             raise ConfigError(f"inputs {self.inputs}: expected at least one channel and none twice")
+
+    @property
+    def n_told(self) -> int:
+        """How many numbers it is told beside the pictures."""
+        return len(self.rules) + (self.w_sc is not None)
+
+    @property
+    def middle_price(self) -> float:
+        """Of the prices that it knows, the one in the middle of their logarithms; 1 where it is told none."""
+        return 1.0 if self.w_sc is None else math.sqrt(self.w_sc[0] * self.w_sc[1])
+
+    def told(self, faces: FaceRule, w_sc: float) -> tuple[float, ...]:
+        """The numbers: 1 for the rule and 0 for others; last the logarithm of the price, 0 for the middle one."""
+        rules = tuple(float(faces == rule) for rule in self.rules)
+        return rules if self.w_sc is None else (*rules, math.log(w_sc / self.middle_price))
 
 
 @dataclass(frozen=True)

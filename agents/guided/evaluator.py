@@ -1,9 +1,11 @@
 """`NfapEvaluator`, `WarpEvaluator`, `QuickEvaluator`: the networks as what the search is told about states.
 
 A prior is a softmax over the legal actions of `NfapNet.choice_logits`: the predicted operator's probability, shared out
-among its legal elements by what the predicted region image shows at each of them. Where the score has another price of
-complexity than the weights were trained with, every logit is corrected by what the action's elements cost more, which
-for a softmax of r_all over a temperature is exact. Letters: A actions, K operator classes, S pixels a side.
+among its legal elements by what the predicted region image shows at each of them. Weights that are told rule and price
+know some of these (`NfapEvaluator.known`) and are asked about no others. For those that are not, every logit is
+corrected by what the action's elements cost more than in training, which for a softmax of r_all over a temperature is
+exact.
+Letters: A actions, K operator classes, S pixels a side.
 """
 
 from abc import abstractmethod
@@ -18,6 +20,7 @@ from agents.guided.nfap import Foresight, NfapNet, candidates_of
 from agents.guided.pictures import draw_inputs, rendering
 from agents.guided.warp import WarpNet
 from agents.guided.weights import NetworkMeta
+from agents.knowing import Known
 from agents.search.batched import BatchedEvaluator
 from agents.search.evaluator import ResidualEvaluator
 from autopoly_env.arrays import AnyArray, FloatArray
@@ -41,9 +44,15 @@ class NfapEvaluator(BatchedEvaluator[Foresight]):
         super().__init__(_REMEMBERED)
         self._net, self._temperature = net, temperature
         labels = meta.training.get("labels", {})
-        self._trained_w_sc = float(labels.get("w_sc", 0.3))
+        self._trained_w_sc = 0.3 if net.config.w_sc is not None else float(labels.get("w_sc", 0.3))
         self._label_temperature = float(labels.get("temperature", 1.0))
         self._residual = ResidualEvaluator()
+
+    @property
+    def known(self) -> Known:
+        """What the weights may be asked about."""
+        config = self._net.config
+        return Known(config.classes, config.rules, config.w_sc)
 
     def prior(self, simulator: Simulator, state: State, actions: Sequence[Action]) -> FloatArray:
         disagreement = Disagreement(state.mesh, simulator.silhouette)
@@ -55,25 +64,27 @@ class NfapEvaluator(BatchedEvaluator[Foresight]):
         is_known = arrays["classes"] >= 0
         if not is_known.any():
             return self._residual.prior_by(disagreement, actions)
-        corrected = logits[0].double().numpy() - self._extra_price(simulator, actions)
+        corrected = logits[0].double().numpy() - self._extra_price(simulator) * arrays["added"]
         odds = np.exp((corrected - corrected.max()) / self._temperature)
         odds += _FLOOR
         odds[~is_known] = 0.0
         normalised: FloatArray = odds / odds.sum()
         return normalised
 
-    def _extra_price(self, simulator: Simulator, actions: Sequence[Action]) -> FloatArray:
-        """(A,) what the elements that each action adds cost more than in training, in units of the labels' softmax."""
-        price_change = (simulator.weights.w_sc - self._trained_w_sc) / self._label_temperature
-        return price_change * np.array([float(sum(_changes(action))) for action in actions])
+    def _extra_price(self, simulator: Simulator) -> float:
+        """What an element costs more than in training, in units of the labels' softmax; 0 if the network is told."""
+        if self._net.config.w_sc is not None:
+            return 0.0
+        return (simulator.weights.w_sc - self._trained_w_sc) / self._label_temperature
 
     def _evaluate(self, simulator: Simulator, states: Sequence[State]) -> Iterable[Foresight]:
         """The first stage of what the network foresees."""
         config = self._net.config
         target = simulator.silhouette.target(config.image_size).coverage
         pictures = np.stack([draw_inputs(state.mesh, target, config.inputs) for state in states])
+        told = torch.tensor([config.told(simulator.faces, simulator.weights.w_sc)] * len(states))
         with torch.inference_mode():
-            said = self._net(torch.from_numpy(pictures), n_stages=1, with_images=False)
+            said = self._net(torch.from_numpy(pictures), told, n_stages=1, with_images=False)
         return [said.row(row) for row in range(len(states))]
 
 
@@ -177,8 +188,3 @@ def _better(
     step = state.step + 1
     done = best.done or ("max_steps" if step >= simulator.max_steps else "")
     return replace(best, step=step, done=done, action=action, choice=choice, n_refits=0)
-
-
-def _changes(action: Action) -> tuple[int, int, int]:
-    changes = operator_named(action.operator).changes
-    return changes[action.element % len(changes)]

@@ -30,6 +30,7 @@ def candidate_arrays(
         "classes": np.array([class_of(action, classes) for action in actions], np.int64),
         "spots": action_spots(mesh, actions, points).astype(np.float32),
         "measures": action_measures(disagreement, actions).astype(np.float32),
+        "added": np.array([sum(_change(mesh, action)) for action in actions], np.float32),
     }
 
 
@@ -56,6 +57,10 @@ def action_measures(disagreement: Disagreement, actions: Sequence[Action]) -> Fl
     around = _around(disagreement.mesh)
     rows = [[*_measured(disagreement, sides, around, action), *everywhere] for action in actions]
     return np.array(rows, np.float64).reshape(len(actions), N_MEASURES)
+
+
+def _change(mesh: PolyMesh, action: Action) -> tuple[int, int, int]:
+    return operator_named(action.operator).change_at(mesh, action.element)
 
 
 def _around(mesh: PolyMesh) -> dict[int, tuple[int, int]]:

@@ -1,7 +1,7 @@
 """nFAP-Net: the next n actions, where they work, and what the shape looks like after each (paper, section 4.1).
 
 Letters: B batch, n stages, S pixels a side, K operator classes, A actions, P points and M measures of each, D numbers
-in the feature, C channels.
+in the feature, C channels, T numbers that the network is told beside the pictures (`NfapConfig.told`).
 """
 
 from collections.abc import Mapping
@@ -27,14 +27,15 @@ class Foresight:
     regions: Tensor  # (B, n, K or 1, S, S)
     images: Tensor | None  # (B, n, S, S), of the shape after the stage's action
     feature: Tensor  # (B, D) the LSTM's state of stage 1
+    told: Tensor  # (B, T)
     maps: Tensor  # (B, C, S/2, S/2) what the regions of stage 1 are drawn from
 
     def row(self, k: int) -> "Foresight":
         """What is said of one sample, as a batch of one; copies, so that the others can be forgotten."""
         images = None if self.images is None else self.images[k : k + 1].clone()
-        parts = (self.operators, self.regions, self.feature, self.maps)
-        operators, regions, feature, maps = (part[k : k + 1].clone() for part in parts)
-        return Foresight(operators, regions, images, feature, maps)
+        parts = (self.operators, self.regions, self.feature, self.told, self.maps)
+        operators, regions, feature, told, maps = (part[k : k + 1].clone() for part in parts)
+        return Foresight(operators, regions, images, feature, told, maps)
 
 
 @dataclass(frozen=True)
@@ -46,42 +47,51 @@ class Candidates:
     log_residual: Tensor  # (B, A)
     spots: Tensor  # (B, A, P, 2) and (B, A, M): see `agents.guided.measures`
     measures: Tensor
+    added: Tensor  # (B, A) elements (vertices, edges, faces) that each adds, at most
 
 
 class _Judge(nn.Module):
     """A correction of the logit of each action, 0 before anything is learnt.
 
     It reads the decoder's maps at the action's spots (mean and maximum of what a layer makes of each, so their order
-    does not matter), the action's class and measures, the residual prior, and the feature of the whole.
+    does not matter), the action's class and measures, the residual prior, the feature of the whole, what the network is
+    told, and, where that ends with a price, how many elements the action adds and what they cost.
     """
 
-    def __init__(self, n_maps: int, feature: int, n_classes: int, width: int = 48) -> None:
+    def __init__(self, n_maps: int, feature: int, n_classes: int, n_told: int, priced: bool, width: int = 48) -> None:
         super().__init__()
+        self.priced = priced
         self.place = nn.Linear(n_maps, width)
-        self.whole = nn.Linear(feature, width)
+        self.whole = nn.Linear(feature + n_told, width)
         self.kind = nn.Embedding(n_classes, width)
-        self.first = nn.Linear(4 * width + N_MEASURES + 1, 2 * width)
+        self.first = nn.Linear(4 * width + N_MEASURES + 1 + 2 * priced, 2 * width)
         self.second = nn.Linear(2 * width, width)
         self.last = nn.Linear(width, 1)
         nn.init.zeros_(self.last.weight)
         nn.init.zeros_(self.last.bias)
 
-    def forward(self, maps: Tensor, feature: Tensor, candidates: Candidates) -> Tensor:
+    def forward(self, maps: Tensor, feature: Tensor, told: Tensor, candidates: Candidates) -> Tensor:
         """(B, A)"""
         at = 2.0 * candidates.spots.to(maps.dtype) - 1.0
         seen = functional.grid_sample(maps, at, padding_mode="border", align_corners=False)  # (B, C, A, P)
         places = functional.relu(self.place(seen.permute(0, 2, 3, 1)))
         kinds = self.kind(candidates.classes.clamp(min=0))
-        whole = functional.relu(self.whole(feature))[:, None].expand_as(kinds)
+        whole = functional.relu(self.whole(torch.cat((feature, told), -1)))[:, None].expand_as(kinds)
         measures = 4.0 * candidates.measures.to(maps.dtype)
         residual = candidates.log_residual.to(maps.dtype)[..., None] / 4.0
         x = torch.cat((places.mean(2), places.amax(2), kinds, whole, measures, residual), -1)
+        if self.priced:
+            added = candidates.added.to(maps.dtype)[..., None] / 4.0
+            x = torch.cat((x, added, told[:, -1:, None].exp() * added), -1)
         x = functional.relu(self.second(functional.relu(self.first(x))))
         return self.last(x)[..., 0]
 
 
 class NfapNet(nn.Module):
-    """CNN encoder, an LSTM that is fed the same feature at every stage, decoders and an action head."""
+    """CNN encoder, an LSTM that is fed the same feature at every stage, decoders and an action head.
+
+    What it is told (rule of faces, price of an element) joins the feature.
+    """
 
     def __init__(self, config: NfapConfig) -> None:
         super().__init__()
@@ -89,7 +99,7 @@ class NfapNet(nn.Module):
         size, widths, feature = config.image_size, config.widths, config.feature
         n_classes = len(config.classes)
         self.encoder = Encoder(len(config.inputs), widths, feature, size)
-        self.memory = nn.LSTMCell(feature, feature)
+        self.memory = nn.LSTMCell(feature + config.n_told, feature)
         self.image_decoder = Decoder(1, widths, feature, size, config.skips)
         n_regions = 1 if config.regions == "one" else n_classes
         self.region_decoder = Decoder(n_regions, widths, feature, size, config.skips)
@@ -97,15 +107,18 @@ class NfapNet(nn.Module):
         self.region_weight = nn.Parameter(torch.ones(n_classes))
         self.residual_weight = nn.Parameter(torch.ones(())) if config.residual else None
         self.region_decoder.begin_with(_RARE)
-        self.judge = _Judge(self.region_decoder.n_last, feature, n_classes) if config.judge else None
+        width, priced = self.region_decoder.n_last, config.w_sc is not None
+        self.judge = _Judge(width, feature, n_classes, config.n_told, priced) if config.judge else None
 
-    def forward(self, pictures: Tensor, n_stages: int | None = None, with_images: bool = True) -> Foresight:
-        """Foresee `n_stages` (by default n) from pictures (B, C, S, S)."""
+    def forward(
+        self, pictures: Tensor, told: Tensor, n_stages: int | None = None, with_images: bool = True
+    ) -> Foresight:
+        """Foresee `n_stages` (by default n) from pictures (B, C, S, S) and what is told beside them (B, T)."""
         feature, maps = self.encoder(pictures)
         state = torch.zeros_like(feature), torch.zeros_like(feature)
         operators, regions, images, firsts = [], [], [], []
         for _ in range(n_stages or self.config.n):
-            state = self.memory(feature, state)
+            state = self.memory(torch.cat((feature, told.to(feature.dtype)), -1), state)
             operators.append(self.action_head(state[0]))
             last = self.region_decoder.last_maps(state[0], maps)
             firsts.append((state[0], last))
@@ -113,7 +126,8 @@ class NfapNet(nn.Module):
             if with_images:
                 images.append(self.image_decoder(state[0], maps)[:, 0])
         drawn = torch.stack(images, 1) if images else None
-        return Foresight(torch.stack(operators, 1), torch.stack(regions, 1), drawn, *firsts[0])
+        first, last = firsts[0]
+        return Foresight(torch.stack(operators, 1), torch.stack(regions, 1), drawn, first, told, last)
 
     def choose(self, said: Foresight, candidates: Candidates) -> Tensor:
         """How promising each legal action is (B, A), from stage 1: `choice_logits`, corrected by the judge if any."""
@@ -121,7 +135,7 @@ class NfapNet(nn.Module):
             said.operators[:, 0], said.regions[:, 0], candidates.points, candidates.classes, candidates.log_residual
         )
         if self.judge is not None:
-            logits = logits + self.judge(said.maps.float(), said.feature.float(), candidates)
+            logits = logits + self.judge(said.maps.float(), said.feature.float(), said.told.float(), candidates)
         return logits
 
     def choice_logits(

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import torch
 
+from agents.choice.config import classes_of
 from agents.guided.config import NfapConfig, WarpConfig
 from agents.guided.nfap import NfapNet
 from agents.guided.warp import WarpNet
@@ -15,6 +16,9 @@ from agents.rl.weights import save_policy
 
 PAPER = NfapConfig(n=2, image_size=32, feature=16, widths=(4, 4, 8, 8))
 RICH = replace(PAPER, inputs=("current", "target", "edges", "vertices"), skips=True, regions="each", residual=True)
+TOLD = replace(
+    RICH, judge=True, classes=("stop", *classes_of("full", "modeller")), rules=("any", "quads"), w_sc=(0.1, 1.5)
+)
 SPEC = SpaceSpec(max_vertices=16, obs_resolution=32, max_steps=6)
 
 

@@ -34,7 +34,7 @@ def _cost(net: nn.Module) -> dict[str, float]:
     with torch.inference_mode():
         counter = FlopCounterMode(display=False)
         with counter:
-            net(pictures, *_as_in_search(net))
+            net(pictures, *_as_in_search(net, 1))
         work["megaflops"] = counter.get_total_flops() / 1e6
         for n in BATCHES:
             work[f"ms at batch {n}"] = _milliseconds(net, pictures.expand(n, -1, -1, -1).contiguous())
@@ -45,8 +45,8 @@ def _n_inputs(net: nn.Module) -> int:
     return len(net.config.inputs) if isinstance(net, NfapNet) else 2
 
 
-def _as_in_search(net: nn.Module) -> tuple[Any, ...]:
-    return (1, False) if isinstance(net, NfapNet) else ()
+def _as_in_search(net: nn.Module, n: int) -> tuple[Any, ...]:
+    return (torch.zeros(n, net.config.n_told), 1, False) if isinstance(net, NfapNet) else ()
 
 
 def _milliseconds(net: nn.Module, pictures: torch.Tensor) -> float:
@@ -54,6 +54,6 @@ def _milliseconds(net: nn.Module, pictures: torch.Tensor) -> float:
     times = []
     for _ in range(N_REPEATS):
         began = time.perf_counter()
-        net(pictures, *_as_in_search(net))
+        net(pictures, *_as_in_search(net, len(pictures)))
         times.append(time.perf_counter() - began)
     return 1e3 * sorted(times)[N_REPEATS // 2]

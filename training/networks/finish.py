@@ -8,6 +8,7 @@ from typing import Any
 
 import torch
 
+from agents.guided.config import NfapConfig
 from agents.guided.layers import n_parameters
 from agents.guided.weights import SHIPPED, save_weights
 from autopoly_env.files import write_atomically
@@ -23,7 +24,7 @@ _ABOUT = {
 _LIMITS = {
     "nfap": "Pictures of 64 x 64 do not show details below two pixels. Trained on random constructions and drawings of "
     "made-up things only; labels look one refit ahead, so actions that pay off later only (face_split) are underrated. "
-    "Priors are for the price of complexity it was trained with; the evaluator corrects them for another one.",
+    "Where it is told no price, priors are for that of its labels; the evaluator corrects them for another one.",
     "warpnet": "A grid of M x M control points cannot move two near vertices apart. It is no refit: it gives a search "
     "a rough idea of what one would do.",
 }
@@ -45,16 +46,31 @@ def finish_run(task: TrainingTask, settings: dict[str, Any], folder: Path, devic
         print(f"exported to {card.parent}")
 
 
-def _origin(folder: str, data: dict[str, Any]) -> str:
+def _origin(folders: str | list[str], data: dict[str, Any]) -> str:
     """Where samples came from, in words."""
-    if not folder:
+    if not folders:
         return f"constructions made live: `{json.dumps(data['source'])}`"
+    return ", ".join(_shards_of(folder) for folder in ([folders] if isinstance(folders, str) else folders))
+
+
+def _shards_of(folder: str) -> str:
     n_shards = len(list(Path(folder).glob("*.npz")))
     try:
         source = json.dumps(json.loads((Path(folder) / "meta.json").read_text(encoding="utf-8"))["source"])
     except (OSError, ValueError, KeyError, TypeError):
         source = "settings not noted"
     return f"{n_shards} shards of `training.make_expert`: `{source}`"
+
+
+def _knows(net: Any) -> str:
+    """What nFAP-Net may be asked about, where it is told rule and price."""
+    config = net.config
+    if not isinstance(config, NfapConfig) or config.w_sc is None:
+        return ""
+    return f"""
+**Knows.** Rules of faces {", ".join(config.rules)}; prices w_sc {config.w_sc[0]:g} to {config.w_sc[1]:g}; what
+{", ".join(config.classes[1:])} do.
+"""
 
 
 def _card(task: TrainingTask, settings: dict[str, Any], metrics: dict[str, float], work: dict[str, float]) -> str:
@@ -65,7 +81,7 @@ def _card(task: TrainingTask, settings: dict[str, Any], metrics: dict[str, float
     return f"""# {task.name}
 
 {_ABOUT[task.name]} {n_parameters(task.net)} parameters.
-
+{_knows(task.net)}
 **Data.** Learnt from {_origin(data["shards"], data)}; measured on {data["n_held_out"]} samples from
 {_origin(data["held_out"], data)}. Targets are made by `autopoly_env.targets`, held-out ones from seeds that training
 never draws. No picture from outside was used.

@@ -24,14 +24,18 @@ def mean_rows(rows: Sequence[dict[str, float]]) -> dict[str, float]:
     return means
 
 
-def nfap_metrics(net: NfapNet, foresight: Foresight, batch: Batch) -> dict[str, float]:
+def nfap_metrics(net: NfapNet, foresight: Foresight, batch: Batch, dearer: float = 0.0) -> dict[str, float]:
     """How good stage 1 is.
+
+    `dearer` is subtracted from the logit of an action for every element that it adds: the correction for another price
+    than that of the labels that the network has learnt from, where it is told none.
 
     operator_accuracy: the likeliest operator class is the label's (*_majority: always saying the batch's commonest
     class). element_top3: given the label's operator, the label's element is among the first three (*_residual: by the
     residual prior, *_chance: by drawing lots). action_top3: the same over all legal actions. gain_top3: what the best
     of the first three actions adds to r_all, as a share of what the best of all does, where the outcomes are known.
-    choice_least: the least that the loss term "choice" can be, the entropy of the labels.
+    choice_least: the least that the loss term "choice" can be, the entropy of the labels. choice_excess: how far the
+    network's own is above it, in states in which there is something to choose.
     """
     truth = batch["first"].argmax(-1)
     majority = torch.bincount(truth, minlength=len(CLASSES)).argmax()
@@ -43,7 +47,8 @@ def nfap_metrics(net: NfapNet, foresight: Foresight, batch: Batch) -> dict[str, 
     }
     if not bool(rows.any()):
         return found | dict.fromkeys(_ranked_names(), float("nan"))
-    prior = net.choose(foresight, candidates_of(batch))[rows]
+    prior = (net.choose(foresight, candidates_of(batch)) - dearer * batch["added"])[rows]
+    found["choice_excess"] = _excess(prior, batch["policy"][rows])
     residual = batch["log_residual"][rows].masked_fill(batch["classes"][rows] < 0, -torch.inf)
     for suffix, logits in (("", prior), ("_residual", residual)):
         found |= {name + suffix: value for name, value in _ranked(logits, batch, rows).items()}
@@ -52,7 +57,13 @@ def nfap_metrics(net: NfapNet, foresight: Foresight, batch: Batch) -> dict[str, 
 
 def _ranked_names() -> list[str]:
     names = ("element_top3", "action_top3", "gain_top3")
-    return [*names, *(f"{name}_residual" for name in names), *(f"{name}_chance" for name in names[:2])]
+    return ["choice_excess", *names, *(f"{name}_residual" for name in names), *(f"{name}_chance" for name in names[:2])]
+
+
+def _excess(logits: Tensor, policy: Tensor) -> float:
+    """The mean Kullback-Leibler divergence of the softmax of logits (B, A) from labels (B, A)."""
+    log_prior = logits.log_softmax(-1).masked_fill(policy == 0.0, 0.0)
+    return float((-(policy * log_prior) - torch.special.entr(policy)).sum(-1).mean())
 
 
 def _best_and_alike(batch: Batch, rows: Tensor) -> tuple[Tensor, Tensor]:

@@ -3,12 +3,13 @@
 Letters: n stages, S pixels a side, A actions, P points of each, Q vertices, E edges.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from agents.guided.config import STOP_CLASS, UNKNOWN, NfapConfig, WarpConfig, class_of
+from agents.guided.config import STOP_CLASS, NfapConfig, WarpConfig, class_of
 from agents.guided.measures import candidate_arrays
 from agents.guided.pictures import draw_inputs, rendering
 from agents.guided.regions import region_image
@@ -18,6 +19,8 @@ from autopoly_env.errors import ConfigError, IllegalActionError
 from autopoly_env.mesh import PolyMesh
 from autopoly_env.operators import OPERATORS, STOP, Action
 from autopoly_env.placement import Disagreement, tried
+from autopoly_env.shown import short
+from training.networks.prices import prices_of
 from training.networks.trajectories import Labelled, Trajectory
 
 Sample = dict[str, AnyArray]
@@ -30,22 +33,30 @@ class LabelConfig:
 
     temperature: float = 0.5  # r_all points: of the softmax over what the actions gain, 0 for stopping
     w_sm: float = 100.0
-    w_sc: float = 0.3
+    w_sc: float | tuple[float, float] = 0.3  # of two, each sample has a price of its own, evenly in its logarithm
     w_si: float = 5.0
 
     def __post_init__(self) -> None:
         above(0, temperature=self.temperature)
-        at_least(0, w_sm=self.w_sm, w_sc=self.w_sc, w_si=self.w_si)
+        low, high = self.prices
+        at_least(0, w_sm=self.w_sm, w_sc=low, w_si=self.w_si)
+        if low != high and not 0.0 < low < high < math.inf:
+            raise ConfigError(f"w_sc = {short(self.w_sc)}: expected one price, or two above 0, the lower first")
 
-    def gains(self, state: Labelled) -> FloatArray:
-        """(A,) what each action adds to r_all; -infinity where it is not known."""
-        weights = np.array((self.w_sm, -self.w_sc, -self.w_si))
+    @property
+    def prices(self) -> tuple[float, float]:
+        """The least and the highest price."""
+        return prices_of(self.w_sc)
+
+    def gains(self, state: Labelled, w_sc: float) -> FloatArray:
+        """(A,) what each action adds to r_all at a price; -infinity where it is not known."""
+        weights = np.array((self.w_sm, -w_sc, -self.w_si))
         gains = (state.outcomes - state.score) @ weights
         return np.where(np.isnan(gains), -np.inf, gains)
 
-    def policy(self, state: Labelled) -> FloatArray:
+    def policy(self, state: Labelled, w_sc: float) -> FloatArray:
         """(1+A,) probabilities of stopping and of each action: of the outcomes, or all on the one that was taken."""
-        gains = np.concatenate(([0.0], self.gains(state)))
+        gains = np.concatenate(([0.0], self.gains(state, w_sc)))
         if not np.isfinite(gains[1:]).any():
             probabilities = np.zeros(len(gains))
             probabilities[state.chosen + 1] = 1.0
@@ -57,19 +68,23 @@ class LabelConfig:
 # --- one sample ---
 
 
-def nfap_sample(trajectory: Trajectory, k: int, config: NfapConfig, labels: LabelConfig) -> Sample:
-    """What nFAP-Net reads in state k, and the truth of its n stages; see `agents.guided.nfap.NfapLabels`."""
+def nfap_sample(trajectory: Trajectory, k: int, config: NfapConfig, labels: LabelConfig, w_sc: float) -> Sample:
+    """What nFAP-Net reads in state k, and the truth of its n stages; see `agents.guided.nfap.NfapLabels`.
+
+    `w_sc` is the price that the labels of stage 1 are for.
+    """
     size, state = config.image_size, trajectory.states[k]
-    classes = np.array([_class_of(action, config) for action in state.actions], np.int64)
-    policy = labels.policy(state)
+    classes = np.array([class_of(action, config.classes) for action in state.actions], np.int64)
+    policy = labels.policy(state, w_sc)
     first = np.bincount(classes, policy[1:], len(config.classes))
     first[STOP_CLASS] = policy[0]
     images, regions, operators = zip(*_stages(trajectory, k, config), strict=True)
     expected = _expected_region(state, policy[1:] * (classes == operators[0]), config.image_size)
     moving = policy[1:].sum()
-    gains = labels.gains(state)
+    gains = labels.gains(state, w_sc)
     return {
         "pictures": draw_inputs(state.mesh, trajectory.silhouette.target(size).coverage, config.inputs),
+        "told": np.array(config.told(trajectory.faces, w_sc), np.float32),
         "images": np.stack(images),
         "regions": np.stack((expected, *regions[1:])),
         "operators": np.array(operators),
@@ -100,19 +115,8 @@ def _stages(trajectory: Trajectory, k: int, config: NfapConfig) -> Iterator[tupl
         yield (
             rendering(after, config.image_size),
             region_image(state.mesh, action, config.image_size),
-            _class_of(action, config),
+            class_of(action, config.classes),
         )
-
-
-def _class_of(action: Action, config: NfapConfig) -> int:
-    """The class of a labelled action. Raises ConfigError for one that the network has no class for."""
-    known = class_of(action, config.classes)
-    if known == UNKNOWN:
-        raise ConfigError(
-            f"the data has actions of {action.operator}, the network's classes are {', '.join(config.classes)}: "
-            "add it to them with net.classes"
-        )
-    return known
 
 
 def warp_sample(trajectory: Trajectory, k: int, config: WarpConfig, placed: bool) -> Sample:

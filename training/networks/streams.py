@@ -18,8 +18,11 @@ from agents.guided.config import NfapConfig, WarpConfig
 from autopoly_env.arrays import AnyArray
 from autopoly_env.compute import set_threads
 from autopoly_env.errors import ConfigError
+from autopoly_env.mesh import FaceRule
+from autopoly_env.operators import operator_named, preset
 from autopoly_env.workers import no_interrupts
 from training.networks.labelling import SourceConfig, build_trajectory
+from training.networks.prices import drawn_price
 from training.networks.samples import LabelConfig, Sample, nfap_sample, turned, warp_sample
 from training.networks.trajectories import Shard, Trajectory
 
@@ -34,6 +37,16 @@ _PADDING = {"classes": -1, "edges": -1}  # of rows that a sample does not have; 
 class Trajectories(Protocol):
     """Some constructions to draw samples from."""
 
+    @property
+    def rules(self) -> set[FaceRule]:
+        """The rules of faces that they keep."""
+        ...
+
+    @property
+    def operators(self) -> set[str]:
+        """Names of the operators of their actions."""
+        ...
+
     def draw(self, rng: np.random.Generator) -> Trajectory: ...
 
 
@@ -43,6 +56,14 @@ class Live:
 
     config: SourceConfig
     held_out: bool = False
+
+    @property
+    def rules(self) -> set[FaceRule]:
+        return {self.config.faces}
+
+    @property
+    def operators(self) -> set[str]:
+        return {operator.name for operator in preset(self.config.operators)}
 
     def draw(self, rng: np.random.Generator) -> Trajectory:
         return build_trajectory(self.config, int(rng.integers(2**31)), self.held_out)
@@ -58,6 +79,14 @@ class Stored:
     def __len__(self) -> int:
         return int(self._ends[-1])
 
+    @property
+    def rules(self) -> set[FaceRule]:
+        return {rule for shard in self._shards for rule in shard.rules}
+
+    @property
+    def operators(self) -> set[str]:
+        return {name for shard in self._shards for name in shard.operators}
+
     def __getitem__(self, number: int) -> Trajectory:
         shard = int(np.searchsorted(self._ends, number, "right"))
         return self._shards[shard][number - int(self._ends[shard - 1]) if shard else number]
@@ -66,18 +95,23 @@ class Stored:
         return self[int(rng.integers(len(self)))]
 
 
-def stored(folder: str, held_out: bool = False) -> Stored:
-    """The shards of a folder: to learn from, or of held-out targets, to measure with.
+def stored(folders: str | Sequence[str], held_out: bool = False) -> Stored:
+    """The shards of a folder or of several: to learn from, or of held-out targets, to measure with.
 
-    Raises ConfigError if there are none, if one is damaged, or if the folder says that they are for the other use.
+    Raises ConfigError if one has none, if one is damaged, or if a folder says that they are for the other use.
     """
+    names = [folders] if isinstance(folders, str) else folders
+    return Stored([path for folder in names for path in _shards_in(folder, held_out)])
+
+
+def _shards_in(folder: str, held_out: bool) -> list[Path]:
     paths = sorted(Path(folder).glob("*.npz"))
     if not paths:
         raise ConfigError(f"no shards (*.npz) in {folder}; make some with python -m training.make_expert {folder}")
     if _are_held_out(Path(folder)) is (not held_out):
         kind, option = ("targets to learn from", "with") if held_out else ("held-out targets", "without")
         raise ConfigError(f"{folder} has shards of {kind} (meta.json); give some that were made {option} --held-out")
-    return Stored(paths)
+    return paths
 
 
 def _are_held_out(folder: Path) -> bool | None:
@@ -93,8 +127,8 @@ def _are_held_out(folder: Path) -> bool | None:
 class DataConfig:
     """Where samples come from."""
 
-    shards: str = ""  # a folder of make_expert; empty: every sample is made when it is needed
-    held_out: str = ""  # such a folder of held-out targets
+    shards: str | tuple[str, ...] = ""  # a folder of make_expert, or several; empty: samples are made when needed
+    held_out: str | tuple[str, ...] = ""  # the same of held-out targets
     n_held_out: int = 512  # samples to measure with, rounded up to whole batches of 64
     source: SourceConfig = field(default_factory=SourceConfig)  # of samples that are not in shards
 
@@ -122,10 +156,15 @@ class NfapStream(Dataset[Sample]):
     seed: int
     turn: bool = True  # one of the eight symmetries for each sample
 
+    def __post_init__(self) -> None:
+        """Raise ConfigError where the network does not know the data's operators, rule of faces or prices."""
+        check_known(self.network, self.labels, self.trajectories)
+
     def __getitem__(self, i: int) -> Sample:
         rng = np.random.default_rng((self.seed, i))
         trajectory, k = _window(self.trajectories, rng, self.network.n)
-        sample = nfap_sample(trajectory, k, self.network, self.labels)
+        w_sc = drawn_price(rng, *self.labels.prices)
+        sample = nfap_sample(trajectory, k, self.network, self.labels, w_sc)
         return turned(sample, int(rng.integers(8)) if self.turn else 0)
 
 
@@ -144,6 +183,28 @@ class WarpStream(Dataset[Sample]):
         trajectory, k = _window(self.trajectories, rng, 1, moving=True)
         sample = warp_sample(trajectory, k, self.network, bool(rng.random() < self.placed_share))
         return turned(sample, int(rng.integers(8)) if self.turn else 0)
+
+
+def check_known(network: NfapConfig, labels: LabelConfig, trajectories: Trajectories) -> None:
+    """Raise ConfigError unless the network knows the labels' prices and the rules and operators of what is labelled."""
+    rules, odd = network.rules or ("any",), sorted(trajectories.rules - {*(network.rules or ("any",))})
+    if odd:
+        raise ConfigError(
+            f"the data keeps faces={odd[0]}, the network knows faces={', '.join(rules)}: add it with net.rules, or "
+            "give other shards"
+        )
+    classes = [name for operator in sorted(trajectories.operators) for name in operator_named(operator).classes]
+    unknown = [name for name in classes if name not in network.classes]
+    if unknown:
+        raise ConfigError(
+            f"the data has actions of {unknown[0]}, the network's classes are {', '.join(network.classes)}: "
+            "add it to them with net.classes"
+        )
+    low, high = labels.prices
+    known = network.w_sc or (low, low)
+    if not known[0] <= low <= high <= known[1]:
+        said = "is told no price" if network.w_sc is None else f"knows w_sc {known[0]:g} to {known[1]:g}"
+        raise ConfigError(f"the labels are for w_sc {low:g} to {high:g}, the network {said}: give another net.w_sc")
 
 
 def _window(

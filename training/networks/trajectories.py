@@ -10,6 +10,7 @@ from functools import cached_property
 from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
+from typing import get_args
 from zipfile import BadZipFile
 
 import numpy as np
@@ -17,7 +18,7 @@ import numpy as np
 from autopoly_env.arrays import AnyArray, BoolArray, Float32Array, IntArray
 from autopoly_env.errors import ConfigError
 from autopoly_env.files import write_atomically
-from autopoly_env.mesh import PolyMesh, Topology
+from autopoly_env.mesh import FaceRule, PolyMesh, Topology
 from autopoly_env.operators import OPERATORS, Action
 from autopoly_env.silhouette import Silhouette
 
@@ -25,6 +26,7 @@ VERSION = 1
 STOPPED = -1  # instead of the row of an action: the right thing is to stop
 _NAMES = list(OPERATORS)
 _CODES = {name: code for code, name in enumerate(_NAMES)}
+_RULE = "U8"  # text long enough for every rule of faces
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,7 @@ class Trajectory:
     mask: BoolArray  # (R, R)
     states: tuple[Labelled, ...]
     ended: bool  # whether it stopped where it ends; otherwise what comes next is not known
+    faces: FaceRule = "any"  # the rule that its states keep
 
     @cached_property
     def silhouette(self) -> Silhouette:
@@ -82,6 +85,7 @@ class Shard:
                 "version": np.array(VERSION),
                 "targets": np.packbits(np.stack([t.mask for t in trajectories]), axis=-1),
                 "ended": np.array([t.ended for t in trajectories]),
+                "faces": np.array([t.faces for t in trajectories], _RULE),
                 "n_states": np.array([len(t.states) for t in trajectories], np.int32),
                 "n_vertices": np.array([len(s.mesh.vertices) for s in states], np.int32),
                 "vertices": np.concatenate([s.mesh.vertices for s in states]).astype(np.float32),
@@ -108,7 +112,18 @@ class Shard:
         first, last = self._starts["n_states"][number : number + 2].tolist()
         mask = np.unpackbits(self.arrays["targets"][number].view(np.uint8), axis=-1).astype(np.bool_)
         states = tuple(self._state(k) for k in range(first, last))
-        return Trajectory(mask[:, : len(mask)], states, bool(self.arrays["ended"][number]))
+        return Trajectory(mask[:, : len(mask)], states, bool(self.arrays["ended"][number]), self.rules[number])
+
+    @cached_property
+    def rules(self) -> list[FaceRule]:
+        """The rule of faces of each trajectory; shards that do not say it are older than rules."""
+        rules: list[FaceRule] = self.arrays["faces"].tolist() if "faces" in self.arrays else ["any"] * len(self)
+        return rules
+
+    @property
+    def operators(self) -> set[str]:
+        """Names of the operators of its actions."""
+        return {_NAMES[code] for code in np.unique(self.arrays["actions"][:, 0]).tolist()}
 
     def _state(self, k: int) -> Labelled:
         v0, v1 = self._starts["n_vertices"][k : k + 2].tolist()
@@ -179,6 +194,8 @@ class Shard:
             in_range = (STOPPED <= arrays["chosen"]) & (arrays["chosen"] < np.maximum(arrays["n_actions"], 0))
             if odd or not in_mesh.all() or not in_range.all() or not np.isfinite(arrays["vertices"]).all():
                 return f"{odd[0] if odd else 'an index or a number'} does not fit the rest"
+            if len(self.rules) != len(self) or not {*self.rules} <= {*get_args(FaceRule)}:
+                return "it names a rule of faces that there is not"
             if len(codes) and not (0 <= codes.min() and codes.max() < len(_NAMES)):
                 return "it names an operator that there is not"
         except (KeyError, ValueError, TypeError, IndexError):

@@ -154,14 +154,14 @@ def _reversed_corners(faces: IntArray) -> IntArray:
 
 def clone_sample(one: Prepared, w_sc: float, way: int, config: CloneConfig) -> Sample:
     """What the policy sees, mirrored (bit 0: x, bit 1: y) and transposed (bit 2), and what it is to answer."""
-    labels = LabelConfig(temperature=config.data.temperature, w_sc=w_sc)
+    labels = LabelConfig(temperature=config.data.temperature)
     policy, gains = np.zeros(len(one.mask)), np.full(len(one.mask), _HOPELESS)
-    probabilities, known = labels.policy(one.state), one.index >= 0
+    probabilities, known = labels.policy(one.state, w_sc), one.index >= 0
     policy[0], gains[0] = probabilities[0], 0.0
     policy[one.index[known]] = probabilities[1:][known]
-    gains[one.index[known]] = np.maximum(labels.gains(one.state)[known], _HOPELESS)
+    gains[one.index[known]] = np.maximum(labels.gains(one.state, w_sc)[known], _HOPELESS)
     policy *= one.mask
-    totals = one.totals @ np.array((labels.w_sm, -labels.w_sc, -labels.w_si))
+    totals = one.totals @ np.array((labels.w_sm, -w_sc, -labels.w_si))
     value = config.env.reward_scale * (totals.max() - totals[0])
     sample = {
         **observation_of(turned_observation(one.seen, way), one.mask, w_sc),

@@ -21,7 +21,7 @@ from agents.guided.nfap import NfapLabels, NfapNet, candidates_of, loss_terms
 from agents.guided.pictures import draw_inputs
 from agents.guided.regions import N_POINTS, action_points, region_image
 from agents.guided.warp import WarpNet
-from agents.guided.weights import SHIPPED, NetworkMeta, load_nfap, load_warpnet
+from agents.guided.weights import SHIPPED, NetworkMeta, load_nfap, load_warpnet, save_weights
 from agents.registry import make_agent
 from agents.search.evaluator import ResidualEvaluator
 from autopoly_env.errors import ConfigError
@@ -32,7 +32,7 @@ from autopoly_env.raster import coverage
 from autopoly_env.score import ScoreWeights
 from autopoly_env.simulator import Simulator, State
 from tests.helpers.drawings import BOTTLE, FRAME, HOUSE, painted
-from tests.helpers.networks import PAPER, RICH, make_net, saved_networks
+from tests.helpers.networks import PAPER, RICH, TOLD, make_net, saved_networks
 from tests.helpers.paths import ROOT
 from training.networks.labelling import SourceConfig
 from training.networks.samples import LabelConfig
@@ -125,18 +125,19 @@ def test_inputs__are_drawn_in_the_order_asked_for() -> None:
 # --- the network ---
 
 
-@pytest.mark.parametrize("config", [PAPER, RICH], ids=["paper", "rich"])
+@pytest.mark.parametrize("config", [PAPER, RICH, TOLD], ids=["paper", "rich", "told"])
 def test_net__foresees_n_stages(config: NfapConfig) -> None:
-    said = make_net(config)(torch.rand(3, len(config.inputs), 32, 32))
-    n_regions = 1 if config.regions == "one" else len(CLASSES)
-    assert said.operators.shape == (3, 2, len(CLASSES))
+    said = make_net(config)(torch.rand(3, len(config.inputs), 32, 32), torch.rand(3, config.n_told))
+    n_regions = 1 if config.regions == "one" else len(config.classes)
+    assert said.operators.shape == (3, 2, len(config.classes))
     assert said.regions.shape == (3, 2, n_regions, 32, 32)
     assert said.images is not None and said.images.shape == (3, 2, 32, 32)
 
 
 def test_net__says_the_same_of_stage_one_without_the_others() -> None:
     net, pictures = make_net(), torch.rand(2, 4, 32, 32)
-    alone, all_of_it = net(pictures, n_stages=1, with_images=False), net(pictures)
+    nothing = torch.zeros(2, 0)
+    alone, all_of_it = net(pictures, nothing, n_stages=1, with_images=False), net(pictures, nothing)
     assert alone.images is None and alone.operators.shape[1] == 1
     assert torch.equal(alone.regions[:, 0], all_of_it.regions[:, 0])
 
@@ -176,7 +177,7 @@ def test_net__learns_one_batch(config: NfapConfig) -> None:
     truth = NfapLabels.of(batch)
     losses = []
     for _ in range(25):
-        terms = loss_terms(net, net(batch["pictures"]), truth)
+        terms = loss_terms(net, net(batch["pictures"], batch["told"]), truth)
         losses.append({name: term.item() for name, term in terms.items()})
         optimizer.zero_grad()
         torch.stack(list(terms.values())).sum().backward()
@@ -216,7 +217,7 @@ def test_judge__begins_as_no_correction_and_does_not_mind_how_edges_are_numbered
     net = make_net(config)
     stream = NfapStream(Live(SourceConfig(source="simulator", difficulty=(2, 3))), config, LabelConfig(), seed=0)
     batch = collate([stream[0]])
-    said, candidates = net(batch["pictures"]), candidates_of(batch)
+    said, candidates = net(batch["pictures"], batch["told"]), candidates_of(batch)
     without = net.choice_logits(
         said.operators[:, 0], said.regions[:, 0], candidates.points, candidates.classes, candidates.log_residual
     )
@@ -292,6 +293,122 @@ def test_untrained_prior__with_the_residual_is_near_it() -> None:
         net.region_weight.zero_()
     expected = ResidualEvaluator().prior(simulator, state, actions)
     assert make_evaluator(net).prior(simulator, state, actions) == pytest.approx(expected, abs=1e-3)
+
+
+# --- what it is told ---
+
+
+def test_told__is_the_rule_and_the_logarithm_of_the_price() -> None:
+    config = NfapConfig(rules=("any", "quads"), w_sc=(0.1, 10.0))  # 1 is in the middle
+    assert config.n_told == 3
+    assert config.told("quads", 1.0) == pytest.approx((0.0, 1.0, 0.0))
+    assert config.told("any", np.e) == pytest.approx((1.0, 0.0, 1.0))
+    assert NfapConfig().told("any", 1.0) == ()
+
+
+def costly_net() -> NfapNet:
+    """One that is told the price, with a judge that subtracts what an action's elements cost, and knows no more."""
+    net = make_net(TOLD)
+    assert net.judge is not None
+    with torch.no_grad():
+        net.memory.weight_ih[:, -TOLD.n_told :].zero_()  # so that the operators' shares do not change with it
+        for layer in (net.judge.first, net.judge.second, net.judge.last):
+            layer.weight.zero_()
+            layer.bias.zero_()
+        net.judge.first.weight[0, -1] = net.judge.second.weight[0, 0] = 1.0
+        net.judge.last.weight[0, 0] = -2.0
+    return net
+
+
+def test_prior__is_told_the_price() -> None:
+    """The net subtracts 2 x price in middle prices x elements / 4, so the ratio of two actions is known."""
+    actions = [Action("edge_subdivide", 0), Action("edge_extrude", 0)]  # +2 and +6 elements
+    evaluator, ratios = NfapEvaluator(costly_net(), meta_of({})), []
+    simulator = game()
+    for w_sc in (0.1, 1.5, 0.1):  # one evaluator is asked about one target at several prices
+        simulator.weights = ScoreWeights(w_sc=w_sc)
+        subdivide, extrude = evaluator.prior(simulator, simulator.initial(), actions)
+        ratios.append((extrude - 1e-4) / (subdivide - 1e-4))
+    assert ratios[2] == ratios[0] > ratios[1]
+    change = (1.5 - 0.1) / TOLD.middle_price
+    assert ratios[1] / ratios[0] == pytest.approx(np.exp(-2.0 * change * (6 - 2) / 4), rel=0.02)
+
+
+def test_prior__at_another_price_or_rule_is_not_what_was_remembered() -> None:
+    evaluator, fresh = (NfapEvaluator(make_net(TOLD), meta_of({})) for _ in range(2))
+    target, mesh = painted(HOUSE), PolyMesh.rectangle(0.2, 0.2, 0.8, 0.8)
+    actions = [Action("edge_extrude", edge) for edge in range(4)] + [Action("vertex_dissolve", 0)]
+    priors = []
+    for faces, w_sc in (("any", 0.1), ("any", 1.5), ("quads", 1.5)):
+        simulator = Simulator(target, resolution=64, faces=faces, weights=ScoreWeights(w_sc=w_sc))  # type: ignore[arg-type]
+        priors.append(evaluator.prior(simulator, simulator.initial(mesh), actions))
+    assert not np.allclose(priors[0], priors[1], rtol=1e-4) and not np.allclose(priors[1], priors[2], rtol=1e-4)
+    assert fresh.prior(simulator, simulator.initial(mesh), actions) == pytest.approx(priors[2], rel=1e-5)
+
+
+def test_prior__of_an_operator_that_the_weights_do_not_know_is_nothing() -> None:
+    net = make_net(replace(TOLD, classes=("stop", "edge_extrude", "face_delete")))
+    simulator = game()
+    prior = NfapEvaluator(net, meta_of({})).prior(
+        simulator, simulator.initial(), [Action("edge_subdivide", 0), Action("edge_extrude", 0)]
+    )
+    assert prior.tolist() == [0.0, 1.0]
+
+
+@pytest.mark.parametrize("name", ["nfap-prior", "nfap-mcts"])
+@pytest.mark.parametrize(
+    ("settings", "complaint"),
+    [
+        ({"faces": "convex"}, r"^these weights know faces=any, quads, not convex: give one of them, or others$"),
+        ({"weights": ScoreWeights(w_sc=3.0)}, r"^these weights know w_sc 0\.1 to 1\.5, not 3: give others$"),
+        ({"weights": ScoreWeights(w_sc=0.05)}, r"^these weights know w_sc 0\.1 to 1\.5, not 0\.05: give others$"),
+        ({"operators": "face_inset"}, r"^these weights know stop, edge_extrude, none of which is an operator here"),
+    ],
+)
+def test_agent__refuses_what_the_weights_do_not_know(
+    tmp_path: Path, name: str, settings: dict[str, Any], complaint: str
+) -> None:
+    net = make_net(replace(TOLD, classes=("stop", "edge_extrude")))
+    path = save_weights(tmp_path / "w.safetensors", net, {}, {})
+    agent, simulator = make_agent(name, nfap_weights=str(path), n=2), game(**settings)
+    for ask in (agent.check, agent.solve, lambda game: agent.act(game, game.initial())):
+        with pytest.raises(ConfigError, match=complaint):
+            ask(simulator)
+
+
+def test_old_weights__are_told_nothing_and_refuse_nothing(weights: dict[str, str]) -> None:
+    path = Path(weights["nfap"]).with_suffix(".json")
+    meta = json.loads(path.read_text())
+    for name in ("rules", "w_sc", "classes"):  # as they were written before there were these
+        del meta["config"][name]
+    path.write_text(json.dumps(meta))
+    net, _ = load_nfap(weights["nfap"])
+    assert net.config == RICH
+    agent = make_agent("nfap-prior", nfap_weights=weights["nfap"], n=2)
+    agent.check(game(faces="quads", weights=ScoreWeights(w_sc=3.0)))
+
+
+def test_weights__keep_what_they_know(tmp_path: Path) -> None:
+    path = save_weights(tmp_path / "w.safetensors", make_net(TOLD), {}, {})
+    assert load_nfap(path)[0].config == TOLD
+
+
+@pytest.mark.parametrize(
+    ("changes", "complaint"),
+    [
+        ({"w_sc": [0.0, 1.0]}, "expected two prices above 0, the lower first"),
+        ({"w_sc": [1.0, 0.5]}, "expected two prices above 0, the lower first"),
+        ({"rules": ["any", "any"]}, "expected none twice"),
+        ({"rules": ["round"]}, "its settings do not fit"),
+        ({"rules": ["any"]}, "has shape .* the settings want"),
+    ],
+)
+def test_weights__that_know_nonsense_are_refused(tmp_path: Path, changes: dict[str, Any], complaint: str) -> None:
+    path = save_weights(tmp_path / "w.safetensors", make_net(TOLD), {}, {})
+    meta = json.loads(path.with_suffix(".json").read_text())
+    path.with_suffix(".json").write_text(json.dumps(meta | {"config": meta["config"] | changes}))
+    with pytest.raises(ConfigError, match=complaint):
+        load_nfap(path)
 
 
 def carrying(geometry: str, placed: bool) -> CarryingEvaluator:

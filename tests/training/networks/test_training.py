@@ -12,21 +12,26 @@ import numpy as np
 import pytest
 import torch
 
+from agents.choice.config import classes_of
 from agents.guided.config import CLASSES, STOP_CLASS, NfapConfig, WarpConfig
+from agents.guided.nfap import candidates_of
 from agents.guided.regions import region_image
-from agents.guided.weights import load_nfap, load_warpnet
+from agents.guided.weights import load_nfap, load_warpnet, save_weights
 from autopoly_env.errors import ConfigError, RunError
-from autopoly_env.mesh import is_sane
+from autopoly_env.mesh import PolyMesh, is_sane
+from autopoly_env.operators import Action, operator_named
 from autopoly_env.score import ScoreWeights
 from autopoly_env.simulator import Simulator
+from tests.helpers.networks import RICH, TOLD, make_net
 from tests.helpers.paths import ROOT
 from training import make_expert, train_nfap, train_warpnet
 from training.networks import finish
+from training.networks.inherit import inherit
 from training.networks.labelling import SourceConfig, build_trajectory
 from training.networks.samples import LabelConfig, nfap_sample, turned
 from training.networks.streams import Live, NfapStream, WarpStream, batches, collate, stored
 from training.networks.trainer import OptimConfig, Process, RunConfig, train
-from training.networks.trajectories import STOPPED, Shard, Trajectory
+from training.networks.trajectories import STOPPED, Labelled, Shard, Trajectory
 from training.options import read_config
 
 torch.set_num_threads(1)  # as tests run beside each other
@@ -82,7 +87,7 @@ def test_simulator__labels_what_was_done_and_then_stops() -> None:
 
 def test_search__labels_what_an_agent_did() -> None:
     trajectory = build_trajectory(replace(TEACHER, source="search", agent="greedy", refits=60), 0)
-    totals = [LabelConfig().w_sm * s.score[0] - LabelConfig().w_sc * s.score[1] for s in trajectory.states]
+    totals = [100.0 * s.score[0] - 0.3 * s.score[1] for s in trajectory.states]
     assert trajectory.ended and totals[-1] > totals[0]
 
 
@@ -96,11 +101,154 @@ def test_trajectory__depends_on_its_number_alone(config: SourceConfig) -> None:
 
 def test_policy__is_a_softmax_of_what_is_gained(taught: Trajectory) -> None:
     state = taught.states[0]
-    policy, gains = LabelConfig(temperature=2.0).policy(state), LabelConfig().gains(state)
+    policy, gains = LabelConfig(temperature=2.0).policy(state, 0.3), LabelConfig().gains(state, 0.3)
     assert policy.sum() == pytest.approx(1.0)
     a, b = np.argsort(gains)[-2:]
     assert policy[1 + b] / policy[1 + a] == pytest.approx(np.exp((gains[b] - gains[a]) / 2.0))
     assert policy[1 + b] / policy[0] == pytest.approx(np.exp(gains[b] / 2.0))
+
+
+# --- prices and rules ---
+
+QUADS = SourceConfig(operators="modeller", faces="quads", n_steps=2, n_traced=2, resolution=64, w_sc=(0.1, 1.5))
+BOTH = replace(NET, classes=("stop", *classes_of("full", "modeller")), rules=("any", "quads"), w_sc=(0.1, 1.5))
+
+
+def toy(*outcomes: tuple[float, float, float]) -> Labelled:
+    """A square whose score is 0.5 with 9 elements, and actions with these outcomes."""
+    actions = tuple(Action("edge_subdivide", k) for k in range(len(outcomes)))
+    score = np.array((0.5, 9.0, 0.0), np.float32)
+    made = np.array(outcomes, np.float32).reshape(-1, 3)
+    return Labelled(PolyMesh.rectangle(0.2, 0.2, 0.8, 0.8), score, actions, made, np.zeros(len(actions), np.float32), 0)
+
+
+def test_policy__at_a_price_is_the_softmax_of_outcomes_at_that_price() -> None:
+    """One action gains 2 points of IoU for 4 elements, one 1 point for 2, one is not known."""
+    state = toy((0.52, 13.0, 0.0), (0.51, 11.0, 0.0), (np.nan, np.nan, np.nan))
+    for price, gains in ((0.25, (1.0, 0.5)), (1.0, (-2.0, -1.0))):
+        odds = np.exp(np.array((0.0, *gains)) / 0.5)
+        expected = [*(odds / odds.sum()), 0.0]
+        assert LabelConfig(temperature=0.5).policy(state, price) == pytest.approx(expected, abs=1e-5)
+
+
+def test_outcomes__are_the_same_whatever_the_price() -> None:
+    cheap, dear = (build_trajectory(replace(TEACHER, traced=0.0, n_random=0, w_sc=w_sc), 1) for w_sc in (0.1, 1.5))
+    first, other = cheap.states[0], dear.states[0]
+    assert first.actions == other.actions
+    assert np.array_equal(first.outcomes, other.outcomes, equal_nan=True)
+
+
+def test_teacher__keeps_the_rule_and_shards_remember_it(tmp_path: Path) -> None:
+    found = build_trajectory(QUADS, 1)
+    assert all(is_sane(state.mesh, "quads") for state in found.states)
+    Shard.pack([found, build_trajectory(SIMULATOR, 0)]).save(tmp_path / "s.npz")
+    shard = Shard.load(tmp_path / "s.npz")
+    assert [one.faces for one in (shard[0], shard[1])] == ["quads", "any"]
+    assert shard.operators & {"loop_cut", "edge_cap"} and "edge_subdivide" in shard.operators
+    del shard.arrays["faces"]  # as shards were before there were rules
+    Shard(shard.arrays).save(tmp_path / "old.npz")
+    assert Shard.load(tmp_path / "old.npz")[0].faces == "any"
+    Shard({**shard.arrays, "faces": np.array(["round", "any"])}).save(tmp_path / "odd.npz")
+    with pytest.raises(ConfigError, match="names a rule of faces that there is not"):
+        Shard.load(tmp_path / "odd.npz")
+
+
+def test_sample__is_told_a_price_of_its_own_and_labelled_for_it() -> None:
+    stream = NfapStream(Live(QUADS), BOTH, LabelConfig(w_sc=(0.1, 1.5)), seed=4)
+    told = [stream[i]["told"] for i in range(3)]
+    prices = [BOTH.middle_price * np.exp(row[-1]) for row in told]
+    assert [row[:2].tolist() for row in told] == [[0.0, 1.0]] * 3
+    assert all(0.1 <= price <= 1.5 for price in prices) and len({round(p, 6) for p in prices}) == 3
+    assert stream[1]["told"].tolist() == told[1].tolist()  # it depends on seed and number alone
+    trajectory = build_trajectory(QUADS, 1)
+    sample, state = nfap_sample(trajectory, 0, BOTH, LabelConfig(), 1.5), trajectory.states[0]
+    gains = 100.0 * (state.outcomes[:, 0] - state.score[0]) - 1.5 * (state.outcomes[:, 1] - state.score[1])
+    known = np.isfinite(gains)
+    assert sample["gains"][known] == pytest.approx(gains[known], abs=1e-3)
+    assert sample["added"].tolist() == [
+        sum(operator_named(a.operator).change_at(state.mesh, a.element)) for a in state.actions
+    ]
+
+
+@pytest.mark.parametrize(
+    ("network", "labels", "source", "complaint"),
+    [
+        (
+            NET,
+            0.3,
+            replace(QUADS, operators="full"),
+            "keeps faces=quads, the network knows faces=any: add it with net.ru",
+        ),
+        (
+            replace(BOTH, classes=CLASSES),
+            0.3,
+            QUADS,
+            "the data has actions of edge_cap, the network's classes are stop",
+        ),
+        (
+            NET,
+            (0.1, 1.5),
+            TEACHER,
+            "labels are for w_sc 0.1 to 1.5, the network is told no price: give another net.w_sc",
+        ),
+        (BOTH, 3.0, TEACHER, "labels are for w_sc 3 to 3, the network knows w_sc 0.1 to 1.5: give another net.w_sc"),
+    ],
+)
+def test_stream__of_what_the_network_does_not_know_is_refused(
+    network: NfapConfig, labels: Any, source: SourceConfig, complaint: str
+) -> None:
+    with pytest.raises(ConfigError, match=complaint):
+        NfapStream(Live(source), network, LabelConfig(w_sc=labels), seed=0)
+
+
+@pytest.mark.parametrize(
+    ("settings", "complaint"),
+    [
+        ({"w_sc": (1.0, 0.5)}, "expected one price above 0, or two, the lower first"),
+        ({"w_sc": 0.0}, "expected one price above 0, or two, the lower first"),
+        ({"operators": "nonsense"}, "operators 'nonsense' are unknown"),
+        ({"source": "simulator", "faces": "quads"}, "builds meshes of any faces, not of quads: give source=teacher"),
+    ],
+)
+def test_source__that_makes_no_sense_is_refused(settings: dict[str, Any], complaint: str) -> None:
+    with pytest.raises(ConfigError, match=complaint):
+        SourceConfig(**settings)
+
+
+# --- a network that goes on from another ---
+
+
+def test_inherit__says_of_known_classes_what_the_old_network_did(tmp_path: Path) -> None:
+    rich = replace(RICH, judge=True)
+    old, net = make_net(rich), make_net(TOLD, seed=1)
+    assert old.judge is not None
+    torch.nn.init.normal_(old.judge.last.weight)
+    inherit(net, str(save_weights(tmp_path / "old.safetensors", old, {}, {})))
+    stream = NfapStream(Live(SIMULATOR), TOLD, LabelConfig(), seed=0)
+    sample = stream[0]
+    batch = collate([sample])
+    before, now = old(batch["pictures"], torch.zeros(1, 0)), net(batch["pictures"], batch["told"])
+    rows = [TOLD.classes.index(name) for name in CLASSES]
+    assert torch.equal(now.operators[:, :, rows], before.operators)
+    assert torch.equal(now.regions[:, :, rows], before.regions)
+    candidates = candidates_of(batch)
+    classes = torch.tensor([[rows.index(row) for row in candidates.classes[0].tolist()]])
+    theirs = old.judge(before.maps, before.feature, before.told, replace(candidates, classes=classes))
+    assert net.judge is not None
+    assert torch.allclose(net.judge(now.maps, now.feature, now.told, candidates), theirs, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("config", "complaint"),
+    [
+        (replace(TOLD, judge=True, feature=8), "weights of another network than net says"),
+        (replace(TOLD, classes=("stop", "edge_extrude")), "it knows edge_subdivide, the network's classes do not"),
+    ],
+)
+def test_inherit__refuses_what_does_not_fit(tmp_path: Path, config: NfapConfig, complaint: str) -> None:
+    path = save_weights(tmp_path / "old.safetensors", make_net(replace(RICH, judge=True)), {}, {})
+    with pytest.raises(ConfigError, match=complaint):
+        inherit(make_net(config), str(path))
 
 
 # --- shards ---
@@ -175,7 +323,7 @@ def test_make_expert__makes_what_is_missing(
 
 
 def test_sample__shows_the_region_to_be_expected_of_the_operator(taught: Trajectory) -> None:
-    sample, state = nfap_sample(taught, 0, NET, LabelConfig()), taught.states[0]
+    sample, state = nfap_sample(taught, 0, NET, LabelConfig(), 0.3), taught.states[0]
     odds = sample["policy"] * (sample["classes"] == sample["operators"][0])
     expected = sum(p * region_image(state.mesh, a, 32) for p, a in zip(odds, state.actions, strict=True)) / odds.sum()
     assert np.abs(sample["regions"][0] - expected).max() < 0.2  # unlikely actions are left out
@@ -184,15 +332,15 @@ def test_sample__shows_the_region_to_be_expected_of_the_operator(taught: Traject
 
 def test_sample__after_the_end_is_a_stop() -> None:
     trajectory = build_trajectory(SIMULATOR, 1)
-    sample = nfap_sample(trajectory, trajectory.n_actions, NET, LabelConfig())
+    sample = nfap_sample(trajectory, trajectory.n_actions, NET, LabelConfig(), 0.3)
     assert sample["operators"].tolist() == [STOP_CLASS] * 2 and sample["first"][STOP_CLASS] == 1.0
     assert not sample["regions"].any() and not sample["policy"].any()
     assert np.array_equal(sample["images"][1], sample["pictures"][0])
 
 
 def test_sample__shows_what_comes_next(taught: Trajectory) -> None:
-    sample = nfap_sample(taught, 0, NET, LabelConfig())
-    assert np.array_equal(sample["images"][0], nfap_sample(taught, 1, NET, LabelConfig())["pictures"][0])
+    sample = nfap_sample(taught, 0, NET, LabelConfig(), 0.3)
+    assert np.array_equal(sample["images"][0], nfap_sample(taught, 1, NET, LabelConfig(), 0.3)["pictures"][0])
     chosen = taught.states[0].actions[taught.states[0].chosen]
     assert CLASSES[sample["operators"][0]].startswith(chosen.operator)
     assert sample["first"].sum() == pytest.approx(1.0, abs=1e-5) and len(sample["first"]) == len(CLASSES)
@@ -201,7 +349,7 @@ def test_sample__shows_what_comes_next(taught: Trajectory) -> None:
 @pytest.mark.parametrize("way", range(8))
 def test_symmetry__keeps_pictures_and_points_together(way: int) -> None:
     trajectory = build_trajectory(SIMULATOR, 2)
-    plain = nfap_sample(trajectory, 0, NET, LabelConfig())
+    plain = nfap_sample(trajectory, 0, NET, LabelConfig(), 0.3)
     state = trajectory.states[0]
     sample, chosen = turned(plain, way), state.chosen
     columns, rows = np.floor(32 * sample["points"][chosen]).astype(int).T
