@@ -33,11 +33,11 @@ _OURS = {
     _BY_ONE: Learner("mcts", ONE_BY_ONE, _TREE),
     _SAME: Learner("mcts", _CHOICE, _TREE),
     _TOLD: Learner("foretold", {"long": TOLD}, _BY_ONE),
+    "nfap-prior, tree alone": Learner("nfap-prior", TREE_ALONE, _BY_ONE),
     "choice-prior, tree alone": Learner("choice-prior", TREE_ALONE, _SAME),
     "choice-prior, tree alone, on the plain tree": Learner("choice-prior", TREE_ALONE, _TREE),
 }
 PAPER = _OURS | {
-    "nfap-prior, tree alone": Learner("nfap-prior", TREE_ALONE, _BY_ONE),
     "nfap-mcts": Learner("nfap-mcts", {}, _TREE, ends_by_itself=True),
     "mcts": Learner("mcts"),
     "nfap-prior": Learner("nfap-prior", {}, "mcts"),

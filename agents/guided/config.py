@@ -122,7 +122,7 @@ class NfapPriorConfig(MctsConfig):
     A good prior is best trusted: children are made one by one, and a step is committed soon.
     """
 
-    seeds: tuple[str, ...] = ("trace",)
+    seeds: tuple[str, ...] = ("trace", "quads")  # whichever of them the rule of faces suits
     n_simulations: int = 4
     n_expanded: int = 1
     tree_share: float = 0.5

@@ -24,10 +24,11 @@ from autopoly_env.score import ScoreWeights
 from autopoly_env.simulator import Simulator
 from tests.helpers.networks import RICH, TOLD, make_net
 from tests.helpers.paths import ROOT
-from training import make_expert, train_nfap, train_warpnet
+from training import make_expert, measure_nfap, train_nfap, train_warpnet
 from training.networks import finish
 from training.networks.inherit import inherit
 from training.networks.labelling import SourceConfig, build_trajectory
+from training.networks.metrics import nfap_metrics
 from training.networks.samples import LabelConfig, nfap_sample, turned
 from training.networks.streams import Live, NfapStream, WarpStream, batches, collate, stored
 from training.networks.trainer import OptimConfig, Process, RunConfig, train
@@ -213,6 +214,38 @@ def test_stream__of_what_the_network_does_not_know_is_refused(
 def test_source__that_makes_no_sense_is_refused(settings: dict[str, Any], complaint: str) -> None:
     with pytest.raises(ConfigError, match=complaint):
         SourceConfig(**settings)
+
+
+# --- held-out metrics ---
+
+
+def test_metrics__of_a_net_that_is_told_no_price_are_corrected_for_it(taught: Trajectory) -> None:
+    """The more an element costs, the more the first actions are those that take away."""
+    sample = nfap_sample(taught, 0, NET, LabelConfig(), 0.3)
+    batch = collate([sample | {"gains": -sample["added"]}])  # whatever adds least is best
+    batch["policy"] = torch.nn.functional.one_hot(batch["gains"].argmax(-1), batch["gains"].shape[1]).float()
+    batch["gains"] += 10.0
+    net = make_net(NET)
+    with torch.inference_mode():
+        said = net(batch["pictures"], batch["told"])
+        assert nfap_metrics(net, said, batch, dearer=1e3)["gain_top3"] == pytest.approx(1.0)
+        assert nfap_metrics(net, said, batch, dearer=-1e3)["gain_top3"] < 1.0
+
+
+def test_measure_nfap__has_a_row_for_each_price_and_refuses_what_the_weights_do_not_know(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shards = tmp_path / "shards"
+    shards.mkdir()
+    Shard.pack([build_trajectory(QUADS, k, held_out=True) for k in range(2)]).save(shards / "shard_00000.npz")
+    told = save_weights(tmp_path / "told.safetensors", make_net(TOLD), {}, {})
+    old = save_weights(tmp_path / "old.safetensors", make_net(RICH), {}, {})
+    prices = ["--w-sc", "0.3", "--w-sc", "1.5", "--n", "4"]
+    assert measure_nfap.main([str(shards), "--weights", str(told), *prices]) == 0
+    rows = [line.split() for line in capsys.readouterr().out.splitlines() if " told " in line]
+    assert [row[3] for row in rows] == ["0.3", "1.5"]
+    assert measure_nfap.main([str(shards), "--weights", str(old), *prices]) == 2
+    assert "the data keeps faces=quads, the network knows faces=any" in capsys.readouterr().err
 
 
 # --- a network that goes on from another ---
@@ -570,7 +603,7 @@ def test_two_processes__learn_together(shards: Path, tmp_path: Path) -> None:
     assert losses[0] == pytest.approx(losses[1], rel=1e-3)
 
 
-@pytest.mark.parametrize("command", [train_nfap, train_warpnet, make_expert])
+@pytest.mark.parametrize("command", [train_nfap, train_warpnet, make_expert, measure_nfap])
 def test_help__shows_examples(command: Any, capsys: pytest.CaptureFixture[str]) -> None:
     assert command.main(["--help"]) == 0
     assert f"python -m {command.__name__}" in " ".join(capsys.readouterr().out.split())
