@@ -17,7 +17,7 @@ Floor = dict[str, str]  # a room's name, what is in it
 TABLES = {
     "training": """
         evaluate | compare | improve | make_dataset | make_expert | train_nfap | train_warpnet | rl_clone | train_rl
-        describe_networks | evaluation: agents on suites | policies: training of policies, by playing
+        describe_networks | measure_nfap | evaluation: agents on suites | policies: training of policies, by playing
         improvement: a search teaches a network, round by round
         report: the page that compares runs | datasets: targets on disk | networks: training of networks
         records: what was measured | run_log: of a training | telling: signs of life, tables
@@ -32,7 +32,7 @@ TABLES = {
         search: Monte Carlo tree search; mcts, the default | warm: kernels of agents
         quads: convex quads, told as they are modelled
         climb: hill climbing on outlines | retell: a construction told again | conformance: checks agents
-        trace: best polygons of contours | baselines: random, beam, greedy, ... | entry: options | contract: is it kept
+        trace: best polygons of contours | baselines: random, beam, greedy, ... | entry: options | contract: is it kept | knowing: weights
         base: what every agent is: act and solve
         finish: states become a solution: pared, polished, told without detours
         budget: refits, seconds, simulations
