@@ -62,6 +62,12 @@ def _shards_of(folder: str) -> str:
     return f"{n_shards} shards of `training.make_expert`: `{source}`"
 
 
+def _begun(settings: dict[str, Any]) -> str:
+    """What it went on from, if from anything."""
+    begin = settings.get("begin")
+    return f"\n\n**Begun** with the weights that were at `{begin}` until then." if begin else ""
+
+
 def _knows(net: Any) -> str:
     """What nFAP-Net may be asked about, where it is told rule and price."""
     config = net.config
@@ -84,7 +90,7 @@ def _card(task: TrainingTask, settings: dict[str, Any], metrics: dict[str, float
 {_knows(task.net)}
 **Data.** Learnt from {_origin(data["shards"], data)}; measured on {data["n_held_out"]} samples from
 {_origin(data["held_out"], data)}. Targets are made by `autopoly_env.targets`, held-out ones from seeds that training
-never draws. No picture from outside was used.
+never draws. No picture from outside was used.{_begun(settings)}
 
 **Command.** `python -m training.train_{task.name} {shlex.join(sys.argv[1:])}`, seed {settings["run"]["seed"]}.
 

@@ -588,6 +588,21 @@ def test_warpnet__is_trained_and_exported(shards: Path, tmp_path: Path, monkeypa
     assert "iou_warped" in card and str(meta.training["run"]["seed"]) in card
 
 
+def test_nfap__that_is_told_the_price_begins_with_earlier_weights_and_its_card_says_what_it_knows(
+    shards: Path, finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shipped, begin = tmp_path / "shipped", finished / "nfap.safetensors"
+    monkeypatch.setattr(finish, "SHIPPED", shipped)
+    told = ["net.rules=[any]", "net.w_sc=[0.1, 1.5]", "labels.w_sc=[0.1, 1.5]", f"begin={begin}", "optim.n_steps=4"]
+    both = [*settings(shards, *told), f"data.shards=[{shards}, {shards}]"]
+    assert train_nfap.main([*both, "--out", str(tmp_path / "run"), "--export"]) == 0
+    net, meta = load_nfap(shipped / "nfap.safetensors")
+    assert net.config.rules == ("any",) and meta.training["begin"] == str(begin)
+    card = (shipped / "nfap.md").read_text()
+    assert "Rules of faces any; prices w_sc 0.1 to 1.5; what" in card and f"weights that were at `{begin}`" in card
+    assert card.count("1 shards of") == 3  # two to learn from, one to measure with
+
+
 @pytest.mark.slow
 def test_two_processes__learn_together(shards: Path, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node", "2"]
