@@ -28,11 +28,12 @@ def make_net(config: NfapConfig = RICH, seed: int = 0) -> NfapNet:
 
 
 def saved_networks(folder: Path) -> dict[str, str]:
-    """Files of random weights of nFAP-Net ("nfap") and of WarpNet ("warpnet")."""
+    """Files of random weights: "nfap", "told" (an nFAP-Net that is told rule and price), "warpnet"."""
     warp = WarpNet(WarpConfig(image_size=32, grid=4, feature=16, widths=(4, 4, 8, 8)))
     labels = {"labels": {"w_sc": 0.3, "temperature": 0.5}}
     return {
         "nfap": str(save_weights(folder / "a.safetensors", make_net(), labels, {})),
+        "told": str(save_weights(folder / "c.safetensors", make_net(TOLD), {}, {})),
         "warpnet": str(save_weights(folder / "b.safetensors", warp, {}, {})),
     }
 

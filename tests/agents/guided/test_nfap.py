@@ -346,6 +346,27 @@ def test_prior__at_another_price_or_rule_is_not_what_was_remembered() -> None:
     assert fresh.prior(simulator, simulator.initial(mesh), actions) == pytest.approx(priors[2], rel=1e-5)
 
 
+def test_shipped_prior__takes_away_rather_where_elements_are_dear() -> None:
+    net, meta = load_nfap()
+    shares = []
+    for w_sc in (0.1, 0.3, 1.0, 1.5):
+        simulator = game(BOTTLE, weights=ScoreWeights(w_sc=w_sc))
+        state = simulator.initial(PolyMesh.grid(2, 0.2, 0.2, 0.8, 0.8))  # eight elements more than it needs
+        actions = simulator.legal_actions(state)[1:]
+        prior = NfapEvaluator(net, meta).prior(simulator, state, actions)
+        removes = [OPERATORS[action.operator].removes for action in actions]
+        shares.append(float(prior[removes].sum()))
+    assert shares == sorted(shares) and shares[-1] > shares[0] + 0.1
+
+
+@pytest.mark.parametrize("name", ["nfap-prior", "nfap-mcts"])
+def test_agent__plays_in_the_modellers_style(name: str, weights: dict[str, str]) -> None:
+    simulator = game(HOUSE, operators="modeller", faces="quads", max_steps=3)
+    options: dict[str, Any] = {"nfap_weights": weights["told"], "n": 2, "n_simulations": 4}
+    solution = make_agent(name, **options).solve(simulator, Budget(refits=30))
+    assert is_sane(solution.mesh, "quads") and solution.score.total > simulator.initial().score.total
+
+
 def test_prior__of_an_operator_that_the_weights_do_not_know_is_nothing() -> None:
     net = make_net(replace(TOLD, classes=("stop", "edge_extrude", "face_delete")))
     simulator = game()
@@ -452,9 +473,10 @@ def test_mcts_with_networks__refuses_weights_that_it_would_not_use(weights: dict
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("told", ["nfap", "told"])
 @pytest.mark.parametrize("name", ["nfap-prior", "nfap-mcts"])
-def test_agent__plays(name: str, weights: dict[str, str]) -> None:
-    options: dict[str, Any] = {"nfap_weights": weights["nfap"], "n": 2, "n_simulations": 4}
+def test_agent__plays(name: str, told: str, weights: dict[str, str]) -> None:
+    options: dict[str, Any] = {"nfap_weights": weights[told], "n": 2, "n_simulations": 4}
     if name == "nfap-mcts":
         options |= {"geometry": "warpnet", "warpnet_weights": weights["warpnet"], "n_rollout": 1}
     simulator = game(HOUSE, max_steps=3)
