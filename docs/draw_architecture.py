@@ -32,7 +32,8 @@ TABLES = {
         search: Monte Carlo tree search; mcts, the default | warm: kernels of agents
         quads: convex quads, told as they are modelled
         climb: hill climbing on outlines | retell: a construction told again | conformance: checks agents
-        trace: best polygons of contours | baselines: random, beam, greedy, ... | entry: options | contract: is it kept | knowing: weights
+        trace: best polygons of contours | baselines: random, beam, greedy, ...
+        entry: options | contract: is it kept | knowing: what the weights of a network know, and who heeds it
         base: what every agent is: act and solve
         finish: states become a solution: pared, polished, told without detours
         budget: refits, seconds, simulations
