@@ -28,6 +28,7 @@ HELP = """Label constructions for the networks to learn from, and write them to 
 Examples:
   python -m training.make_expert runs/expert                               # teacher's labels: about 0.4 s each and core
   python -m training.make_expert runs/held_out --held-out --n 256          # other targets, to measure with
+  python -m training.make_expert runs/modeller operators=modeller faces=quads w_sc=[0.1,1.5]   # the modeller's style
   python -m training.make_expert runs/paper source=simulator               # the paper's labels: about 30 ms each
   python -m training.make_expert runs/climbs source=search agent=climb     # what an agent did
 
@@ -104,6 +105,8 @@ def _claim(folder: Path, meta: dict[str, Any]) -> None:
         return
     except (OSError, ValueError):
         raise ConfigError(f"cannot read {path}; give another folder, or delete this one") from None
+    if isinstance(known, dict) and isinstance(known.get("source"), dict):
+        known["source"] = {"faces": "any"} | known["source"]  # which folders of before there were rules do not say
     if known != meta:
         raise ConfigError(f"{folder} holds shards made with other settings (meta.json); give another folder")
 

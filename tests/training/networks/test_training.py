@@ -348,6 +348,13 @@ def test_make_expert__makes_what_is_missing(
     assert make_expert.main([*command, "--n", "4"]) == 0
     assert "1 of 1" in capsys.readouterr().out
     assert (tmp_path / "shard_00000.npz").read_bytes() == first and len(stored(str(tmp_path))) == 4
+    meta = json.loads((tmp_path / "meta.json").read_text())
+    assert meta["source"].pop("faces") == "any"
+    (tmp_path / "meta.json").write_text(json.dumps(meta))  # as it was before there were rules
+    assert make_expert.main([*command, "--n", "4"]) == 0
+    capsys.readouterr()
+    assert make_expert.main([*command, "--n", "4", "difficulty=[1,2]"]) == 2
+    capsys.readouterr()
     assert make_expert.main([str(tmp_path), "source=teacher", "--n", "4"]) == 2
     assert "holds shards made with other settings" in capsys.readouterr().err
 
