@@ -117,6 +117,8 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
     - `operators`: a preset ("paper", "full", "modeller") or names with commas between them.
     - `resolution`: pixels a side at which meshes are fitted and scored; `obs_resolution`: of the observed pictures.
     - `faces`: the rule of faces that every mesh keeps: "any", "convex", "quads" (convex, 3 or 4 corners).
+    - `exact_mask`: whether the mask leaves out what the rule of faces has no room for. Every action has to be tried for
+      that, which takes nearly all of a step's time; where it is False, such an action does nothing when it is taken.
     - `max_steps`, `max_vertices`, `match_threshold`: see above.
     - `reward_mode`, `illegal_penalty`, `w_sm`, `w_sc`, `w_si`: see above.
     - `info_texts`: whether infos also say in words what was done, why it is over and what the target is called.
@@ -153,6 +155,7 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
         max_vertices: int = 32,
         match_threshold: float = 0.99,
         faces: str = "any",
+        exact_mask: bool = True,
         reward_mode: str = "score",
         illegal_penalty: float = 1.0,
         w_sm: float = 100.0,
@@ -181,6 +184,7 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
         self._rules = tuple((name, value) for name, value in rules.items() if name != "target")
         self._improvement = one_of("reward_mode", reward_mode, REWARD_MODES) == "improvement"
         self._illegal_penalty = number("illegal_penalty", illegal_penalty)
+        self._exact_mask = one_of("exact_mask", exact_mask, (False, True))
         self._info_texts = one_of("info_texts", info_texts, (False, True))
         self.render_mode = one_of("render_mode", render_mode, (None, *RENDER_MODES))
         self._render_size = whole("render_size", render_size, 16, 4096)
@@ -264,6 +268,13 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
     def action_masks(self) -> BoolArray:
         """(n_actions,) which actions are legal now; the name is the one that MaskablePPO looks for."""
         return self._legal_mask().copy()
+
+    def set_price(self, w_sc: float) -> None:
+        """Let an element cost `w_sc` points from the next reset on. States of another price are not restored then."""
+        weights = replace(self._simulator_settings["weights"], w_sc=number("w_sc", w_sc))
+        self._simulator_settings["weights"] = weights
+        self._rules = tuple((name, weights.w_sc if name == "w_sc" else value) for name, value in self._rules)
+        self._source = _Source(self.targets)  # what it has prepared has a score at the price before
 
     # --- what planners ask for
 
@@ -358,7 +369,7 @@ class AutoPolyEnv(gymnasium.Env[Observation, Any]):
     def _legal_mask(self) -> BoolArray:
         if self._mask is None:
             self._mask = self.codec.legal_mask(self.state.mesh)
-            if self._simulator.faces != "any":
+            if self._simulator.faces != "any" and self._exact_mask:
                 self._mask &= self.codec.mask_of(self._simulator.legal_actions(self.state))
             if self._current().no_room:
                 self._mask[list(self._current().no_room)] = False

@@ -98,12 +98,13 @@ def _claim(folder: Path, meta: dict[str, Any]) -> None:
     path = folder / "meta.json"
     try:
         known = json.loads(path.read_text(encoding="utf-8"))
+        known["source"].setdefault("faces", "any")  # which older shards do not note
     except FileNotFoundError:
         if any(folder.glob("*.npz")):
             raise ConfigError(f"{folder} has shards but no meta.json; give another folder") from None
         write_atomically(path, json.dumps(meta, indent=2) + "\n")
         return
-    except (OSError, ValueError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
         raise ConfigError(f"cannot read {path}; give another folder, or delete this one") from None
     if isinstance(known, dict) and isinstance(known.get("source"), dict):
         known["source"] = {"faces": "any"} | known["source"]  # which folders of before there were rules do not say

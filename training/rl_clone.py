@@ -22,15 +22,19 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
+from torch.utils.data import Dataset
 
 from agents.rl.network import NEVER, MeshNet
 from agents.rl.weights import save_policy
 from autopoly_env.files import write_atomically
 from training.networks.command import ConfigFile, Folder, Overrides, ShowConfig, new_app, run_training, train_network
 from training.networks.metrics import mean_rows
-from training.networks.streams import Batch, HeldOut, stored
+from training.networks.samples import Sample
+from training.networks.streams import Batch, HeldOut, InTurn, Made, stored
 from training.policies.clone_samples import PICTURES, CloneConfig, CloneStream
 from training.policies.evaluation import evaluate, evaluations_of, flat, mean_final, mean_start, summary
+from training.policies.play_samples import PlayStream, read_plays
+from training.policies.starting import begun_with
 from training.run_log import known
 from training.telling import table_of
 
@@ -56,6 +60,24 @@ class CloneLosses(nn.Module):
         return {"loss": choice + self.value_weight * worth, "choice": choice, "value": worth}
 
 
+def _streams(config: CloneConfig) -> tuple[InTurn, InTurn]:
+    """Samples to learn from, and to measure with."""
+    data, seed = config.data, config.run.seed
+    learn: list[Dataset[Sample]] = []
+    unseen: list[Dataset[Sample]] = []
+    for folder in filter(None, data.shards.split(",")):
+        learn.append(CloneStream(stored(folder), config, seed, made=Made.of(folder)))
+    for folder in filter(None, data.held_out.split(",")) if data.shards else ():
+        held_out = stored(folder, held_out=True)
+        unseen.append(CloneStream(held_out, config, seed, turn=False, made=Made.of(folder)))
+    if data.plays:
+        plays, others = read_plays(data.plays, config.env.spec(), data.least_gain)
+        n_equal = max(1, len(learn))  # as many samples of plays as of shards
+        learn += [PlayStream(plays, config, seed + k) for k in range(n_equal)]
+        unseen += [PlayStream(others, config, seed + k, turn=False) for k in range(n_equal)]
+    return InTurn(learn), InTurn(unseen)
+
+
 class CloneTask:
     """The policy for the trainer."""
 
@@ -64,10 +86,11 @@ class CloneTask:
     def __init__(self, config: CloneConfig) -> None:
         torch.manual_seed(config.run.seed)
         self.config = config
-        self.net = MeshNet(config.net, config.env.spec())
+        spec = config.env.spec()
+        self.net = begun_with(Path(config.init), config.net, spec) if config.init else MeshNet(config.net, spec)
+        self.net.train()
         self.losses = CloneLosses(self.net, config.value_weight)
-        self.stream = CloneStream(stored(config.data.shards), config, config.run.seed)
-        unseen = CloneStream(stored(config.data.held_out, held_out=True), config, config.run.seed, turn=False)
+        self.stream, unseen = _streams(config)
         self._held_out = HeldOut(unseen, config.data.n_held_out)
 
     def measure(self, device: torch.device) -> dict[str, float]:

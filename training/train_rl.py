@@ -27,16 +27,16 @@ from agents.commands.progress import progress_bar
 from agents.commands.pulse import Pulse
 from agents.rl.algorithms import load_checkpoint, make_model, net_of_zip
 from agents.rl.envs import EnvFactory, make_vec_env
+from agents.rl.growing import grown
 from agents.rl.network import MeshNet
 from agents.rl.policies import put_net
-from agents.rl.weights import load_policy
-from autopoly_env.errors import ConfigError
 from training.networks.command import ConfigFile, Export, Overrides, ShowConfig, new_app, print_config, run_training
 from training.options import read_config
 from training.policies.config import RlRunConfig, TrainRlConfig
 from training.policies.export import export_policy
 from training.policies.run_state import LearningRate, RunState, state_in
 from training.policies.session import Session
+from training.policies.starting import begun_with
 
 
 def train_rl(config: TrainRlConfig, folder: Path, trust: bool = False) -> RunState:
@@ -99,20 +99,14 @@ def initial_net(config: TrainRlConfig, trust: bool) -> MeshNet:
     """The network that `run.init` names. Raises ConfigError, which names both settings, if it is for another game."""
     path, spec = Path(config.run.init), config.env.spec()
     if path.suffix == ".zip":
-        net = MeshNet(config.net, spec)
-        net_of_zip(path, net, trust)
-        return net
-    net, _ = load_policy(path)
-    spec.check_same(net.spec, "this run", str(path))
-    if net.config != config.net:
-        raise ConfigError(f"{path}: a network {net.config}; this run: {config.net}: make them agree")
-    return net
+        return grown(net_of_zip(path, config.net, spec, trust), spec)
+    return begun_with(path, config.net, spec)
 
 
 def _environments(config: TrainRlConfig, step: int) -> VecEnv:
     env = config.env
     factory = EnvFactory(env.spec(), env.resolution, env.reward_scale, env.illegal_penalty, env.n_plays)
-    return make_vec_env(factory, env.courses, config.run.n_envs, config.run.envs, _seed(config.run, step))
+    return make_vec_env(factory, env.tasks(), config.run.n_envs, config.run.envs, _seed(config.run, step))
 
 
 def _seed(run: RlRunConfig, step: int) -> int:

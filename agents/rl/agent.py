@@ -28,6 +28,11 @@ class RlAgent(Agent):
         self.name = name
         self._config, self._player = config, player
 
+    def check(self, simulator: Simulator) -> None:
+        """As every agent; raises ConfigError also where the weights do not know the rule, price or operators."""
+        super().check(simulator)
+        self._player.check(simulator)
+
     def act(self, simulator: Simulator, state: State) -> Decision:
         """The likeliest action, or one that is drawn."""
         config = self._config
@@ -56,6 +61,17 @@ class RlPriorAgent(MctsAgent):
 
     name = "rl-prior"
 
+    def __init__(self, config: RlPriorConfig, incumbents: Sequence[Agent], player: "Player") -> None:
+        from agents.rl.evaluator import RlEvaluator
+
+        super().__init__(config, incumbents, RlEvaluator(player, config.temperature))
+        self._player = player
+
+    def check(self, simulator: Simulator) -> None:
+        """As every agent; raises ConfigError also where the weights do not know the rule, price or operators."""
+        super().check(simulator)
+        self._player.check(simulator)
+
 
 def rl_agent(name: str, config: RlConfig) -> Agent:
     """The agent of a config. Raises ConfigError if its weights are missing or damaged."""
@@ -64,10 +80,7 @@ def rl_agent(name: str, config: RlConfig) -> Agent:
 
 def rl_prior(config: RlPriorConfig, incumbents: Sequence[Agent] = ()) -> Agent:
     """The agent of a config; `incumbents` are the agents that it names as seeds. Raises ConfigError as `rl_agent`."""
-    player = _player("rl-prior", PRIOR, config.weights)
-    from agents.rl.evaluator import RlEvaluator
-
-    return RlPriorAgent(config, incumbents, RlEvaluator(player, config.temperature))
+    return RlPriorAgent(config, incumbents, _player("rl-prior", PRIOR, config.weights))
 
 
 def _player(name: str, owner: str, weights: str) -> "Player":

@@ -131,8 +131,8 @@ def load_checkpoint(path: Path, model: BaseAlgorithm, note: dict[str, Any]) -> N
     model._n_updates = int(note["n_updates"])
 
 
-def net_of_zip(path: Path, net: MeshNet, trust: bool) -> None:
-    """Fill a network with what a zip of SB3 holds, which must be of the same network and spaces.
+def net_of_zip(path: Path, config: NetConfig, spec: SpaceSpec, trust: bool) -> MeshNet:
+    """The network that a zip of SB3 holds, which must be of these settings, and of spaces that `spec` can grow from.
 
     A zip without our note is refused unless `trust`: what it is for stands in its pickled part alone, and unpickling
     can run any code. Raises ConfigError.
@@ -146,20 +146,22 @@ def net_of_zip(path: Path, net: MeshNet, trust: bool) -> None:
     try:
         data, params, _ = load_from_zip_file(str(path), load_data=note is None, device="cpu")
         kwargs = data["policy_kwargs"] if note is None else note  # type: ignore[index]
-        spec, config = kwargs["spec" if "spec" in kwargs else "rules"], kwargs["net"]  # "rules" in older zips
+        theirs, net_config = kwargs["spec" if "spec" in kwargs else "rules"], kwargs["net"]  # "rules" in older zips
         if note is not None:
-            spec = validated(SpaceSpec, spec)
-            config = validated(NetConfig, config)
+            theirs = validated(SpaceSpec, theirs)
+            net_config = validated(NetConfig, net_config)
         policy: Any = params["policy"]
         tensors = _network_of(policy)
     except Exception as error:  # whatever the damage, or the other project, leads SB3 and torch to
         raise ConfigError(
             f"{path}: no policy of this project ({type(error).__name__}: {error}); give another"
         ) from None
-    net.spec.check_same(spec, "this run", str(path))
-    if config != net.config:
-        raise ConfigError(f"{path}: a network {config}; this run: {net.config}: make them agree")
+    spec.check_same(theirs, "this run", str(path))
+    if net_config != config:
+        raise ConfigError(f"{path}: a network {net_config}; this run: {config}: make them agree")
+    net = MeshNet(config, theirs)
     fill(net, tensors, str(path))
+    return net
 
 
 def _network_of(tensors: dict[str, Tensor]) -> dict[str, Tensor]:

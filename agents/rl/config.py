@@ -4,13 +4,14 @@ Letters: N `max_vertices`, R pixels a side of the observed pictures.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, Literal
 
 from agents.search.config import MctsConfig
-from autopoly_env.arguments import at_least
+from autopoly_env.arguments import above, at_least
 from autopoly_env.errors import ConfigError
-from autopoly_env.operators import preset
+from autopoly_env.mesh import FaceRule
+from autopoly_env.operators import PRESETS, preset
 from autopoly_env.shown import short
 from autopoly_env.targets import ConstructionTargets, TargetSource, make_targets
 
@@ -43,15 +44,22 @@ class NetConfig:
 
 @dataclass(frozen=True)
 class SpaceSpec:
-    """The observation and action spaces that a policy was made for: where it plays they must be the same."""
+    """The observation and action spaces that a policy was made for, and the rules and prices that it was trained under.
+
+    Weights from before those were noted have neither: they are asked under any, and are not told the rule.
+    """
 
     operators: tuple[str, ...] = OPERATORS
     max_vertices: int = 48  # N
     obs_resolution: int = 64  # R
     max_steps: int = 24  # of a construction; after them it stops
+    faces: tuple[FaceRule, ...] = ()  # rules of faces; none: not noted, and no input
+    w_sc: tuple[float, float] | tuple[()] = ()  # prices of an element, from and to; none: not noted
 
     def __post_init__(self) -> None:
         preset(self.operators)
+        if self.w_sc:
+            check_prices(self.w_sc)
         at_least(4, max_vertices=self.max_vertices)
         at_least(1, max_steps=self.max_steps)
         if self.obs_resolution % 16 or not 16 <= self.obs_resolution <= 256:
@@ -60,10 +68,13 @@ class SpaceSpec:
             )
 
     def check_same(self, other: "SpaceSpec", ours: str, theirs: str) -> None:
-        """Raise ConfigError, which names both settings, unless `other`, of `theirs`, is what these, of `ours`, are."""
-        for name, value in vars(self).items():
-            found = getattr(other, name)
-            if found != value:
+        """Raise ConfigError, which names both settings, unless `other`, of `theirs`, is what these, of `ours`, are.
+
+        `other` may lack operators and know other rules and prices: what it lacks is learnt anew (`agents.rl.growing`).
+        """
+        for name in (field.name for field in fields(self) if field.name not in ("faces", "w_sc")):
+            value, found = getattr(self, name), getattr(other, name)
+            if found != value and not (name == "operators" and set(found) <= set(value)):
                 raise ConfigError(f"{theirs}: {name} {_shown(found)}; {ours}: {name} {_shown(value)}: make them agree")
 
     def check_operators(self, operators: tuple[str, ...], name: str) -> None:
@@ -74,6 +85,15 @@ class SpaceSpec:
                 f"give operators={_shown(self.operators)} or other weights"
             )
 
+    def check_rule(self, faces: FaceRule, w_sc: float) -> None:
+        """Raise ConfigError unless the policy was trained under this rule of faces and at such a price."""
+        if self.faces and faces not in self.faces:
+            known = ", ".join(self.faces)
+            raise ConfigError(f"these weights know faces={known}, not {faces}: give one of them, or others")
+        if self.w_sc and not self.w_sc[0] <= w_sc <= self.w_sc[1]:
+            low, high = self.w_sc
+            raise ConfigError(f"these weights know w_sc {low:g} to {high:g}, not {w_sc:g}: give others")
+
 
 Rules = SpaceSpec  # by which name the pickled part of older zips of Stable-Baselines3 knows it
 
@@ -83,13 +103,39 @@ class TaskSpec:
     """What is to be built in an environment, and at which price."""
 
     targets: str = "construction"  # "construction", "objects" or a folder of images
-    w_sc: float = 1.0  # price of an element, in points of r_all
+    w_sc: float | tuple[float, float] = 1.0  # price of an element, in points of r_all; from and to: drawn each episode
     difficulty: tuple[int, int] = (1, 5)  # of constructions: how many actions change the outline
     operators: str = "paper"  # that constructions are made with
+    faces: FaceRule = "any"  # rule that the policy's meshes keep
+    policy_operators: str = ""  # that the policy has in it; empty: those of the environments
 
     def __post_init__(self) -> None:
-        if not self.w_sc >= 0.0:
+        if isinstance(self.w_sc, tuple):
+            check_prices(self.w_sc)
+            above(0, w_sc=self.w_sc[0])
+        elif not self.w_sc >= 0.0:
             raise ConfigError(f"w_sc {self.w_sc}: expected a price of at least 0")
+        if self.policy_operators:
+            preset(self.policy_operators)
+
+    @property
+    def prices(self) -> tuple[float, float]:
+        """The lowest price and the highest."""
+        return self.w_sc if isinstance(self.w_sc, tuple) else (self.w_sc, self.w_sc)
+
+    def price_at(self, share: float) -> float:
+        """The price at a share, 0 to 1, of the way from the lowest to the highest, evenly in its logarithm."""
+        low, high = self.prices
+        return low if low == high else min(high, max(low, low * (high / low) ** share))
+
+    def operators_of(self, spec: SpaceSpec) -> tuple[str, ...]:
+        """The policy's operators that may be used, in the policy's order. Raises ConfigError for others."""
+        if not self.policy_operators:
+            return spec.operators
+        own = {operator.name for operator in preset(self.policy_operators)}
+        if not own <= set(spec.operators):
+            raise ConfigError(f"policy_operators {self.policy_operators}: the policy has {_shown(spec.operators)} only")
+        return tuple(name for name in spec.operators if name in own)
 
     def source(self, difficulty: tuple[int, int] | None = None) -> TargetSource:
         """The targets; constructions may have another difficulty. Raises ConfigError."""
@@ -98,10 +144,16 @@ class TaskSpec:
         return make_targets(self.targets)
 
 
+def check_prices(w_sc: tuple[float, float]) -> None:
+    """Raise ConfigError unless these are two prices, the lower first."""
+    if not 0.0 <= w_sc[0] <= w_sc[1] < math.inf:
+        raise ConfigError(f"w_sc {short(w_sc)}: expected two prices of at least 0, the lower first")
+
+
 def _shown(value: Any) -> str:
     if not isinstance(value, tuple):
         return str(value)
-    known = {preset_name: tuple(o.name for o in preset(preset_name)) for preset_name in ("paper", "full")}
+    known = {name: tuple(operator.name for operator in operators) for name, operators in PRESETS.items()}
     named = [name for name, operators in known.items() if set(operators) == set(value)]
     return named[0] if named else ",".join(map(str, value))
 

@@ -16,15 +16,18 @@ from stable_baselines3.common.vec_env import SubprocVecEnv, VecEnv
 
 from agents.rl.config import SpaceSpec, TaskSpec
 from agents.rl.player import observation_of
-from autopoly_env.arrays import AnyArray
+from autopoly_env.arrays import AnyArray, BoolArray, IntArray
 from autopoly_env.compute import Routine, run, run_all, set_threads
 from autopoly_env.env import AutoPolyEnv, EnvState
-from autopoly_env.errors import ConfigError
+from autopoly_env.errors import ConfigError, IllegalActionError
+from autopoly_env.mesh import FACE_RULES
 from autopoly_env.observation import Observation
+from autopoly_env.operators import ActionCodec
 from autopoly_env.silhouette import Silhouette
 from autopoly_env.targets import LEARNING, TargetSource
 
 _HIGHEST_PRICE = 1e6
+_OTHER = -1  # instead of the number of an action
 
 
 @dataclass(frozen=True)
@@ -56,7 +59,9 @@ class EnvFactory:
         spec = self.spec
         env = AutoPolyEnv(
             targets=_LearningTargets(task.source()),
-            operators=",".join(spec.operators),
+            operators=",".join(task.operators_of(spec)),
+            faces=task.faces,
+            exact_mask=False,
             resolution=self.resolution,
             obs_resolution=spec.obs_resolution,
             max_steps=spec.max_steps,
@@ -64,23 +69,36 @@ class EnvFactory:
             match_threshold=1.0,
             reward_mode="improvement",
             illegal_penalty=self.illegal_penalty,
-            w_sc=task.w_sc,
+            w_sc=task.prices[0],
         )
-        return TrainingEnv(env, task, self.reward_scale, self.n_plays)
+        return TrainingEnv(env, task, self.reward_scale, self.n_plays, spec.operators)
 
 
 class TrainingEnv(gymnasium.Wrapper[Observation, Any, Observation, Any]):
     """An environment to learn in; see the module. `info["episode"]` at an end is what SB3's Monitor would say."""
 
-    def __init__(self, env: AutoPolyEnv, task: TaskSpec, reward_scale: float, n_plays: int = 1) -> None:
+    def __init__(
+        self,
+        env: AutoPolyEnv,
+        task: TaskSpec,
+        reward_scale: float,
+        n_plays: int = 1,
+        operators: tuple[str, ...] = (),
+    ) -> None:
+        """`operators`: those that the policy numbers its actions by, if it knows more than the environment's."""
         super().__init__(env)
         self._inner, self._task, self._reward_scale = env, task, reward_scale
+        codec = ActionCodec(operators or env.codec.operators, env.codec.max_vertices)
+        self._number = _numbers(env.codec, codec)  # (G,) the environment's number of each action; _OTHER for none
+        self._price, self._prices = task.prices[0], np.random.default_rng()
         boxes = dict(env.observation_space.spaces)  # type: ignore[attr-defined]
         more: dict[str, gymnasium.Space[Any]] = {
-            "action_mask": spaces.Box(0, 1, (env.codec.n_actions,), np.int8),
+            "action_mask": spaces.Box(0, 1, (codec.n_actions,), np.int8),
             "price": spaces.Box(0.0, _HIGHEST_PRICE, (1,), np.float32),
+            "rule": spaces.Box(0.0, 1.0, (len(FACE_RULES),), np.float32),
         }
         self.observation_space = cast(gymnasium.Space[Observation], spaces.Dict({**boxes, **more}))
+        self.action_space = spaces.Discrete(codec.n_actions)
         self._return = 0.0
         self._n_plays, self._n_played = n_plays, 0
         self._first: EnvState | None = None  # of this target
@@ -97,8 +115,12 @@ class TrainingEnv(gymnasium.Wrapper[Observation, Any, Observation, Any]):
 
     def reset_routine(self, options: dict[str, Any] | None = None) -> Routine[tuple[Observation, dict[str, Any]]]:
         """As that of `AutoPolyEnv`; without options the same target again, until it has had its plays."""
+        low, high = self._task.prices
+        if low < high:
+            self._price = self._task.price_at(self._prices.random())
+            self._inner.set_price(self._price)
         if not options and self._first is not None and self._n_played < self._n_plays:
-            options = {"state": self._first}
+            options = {"state": self._first} if low == high else _from(self._first)
         else:
             self._n_played = 0
         observation, info = yield from self._inner.reset_routine(options)
@@ -107,8 +129,8 @@ class TrainingEnv(gymnasium.Wrapper[Observation, Any, Observation, Any]):
         return self._seen(observation, info), info
 
     def step_routine(self, action: Any) -> Routine[tuple[Observation, float, bool, bool, dict[str, Any]]]:
-        """As that of `AutoPolyEnv`."""
-        observation, points, terminated, truncated, info = yield from self._inner.step_routine(action)
+        """As that of `AutoPolyEnv`. Raises IllegalActionError for an action of an operator that its task has not."""
+        observation, points, terminated, truncated, info = yield from self._inner.step_routine(self._own(action))
         reward = self._reward_scale * points
         self._return += reward
         if terminated or truncated:
@@ -119,11 +141,12 @@ class TrainingEnv(gymnasium.Wrapper[Observation, Any, Observation, Any]):
     def seed(self, seed: int) -> None:
         """Draw the next targets from this seed on."""
         gymnasium.Env.reset(self._inner, seed=seed)
+        self._prices = np.random.default_rng((seed, 1))
         self._first = None
 
     def action_masks(self) -> AnyArray:
         """(n_actions,) bool, which actions are legal now."""
-        return self._inner.action_masks()
+        return self._widened(self._inner.action_masks())
 
     def set_difficulty(self, most: int) -> None:
         """Draw constructions of at most this difficulty from now on."""
@@ -131,8 +154,36 @@ class TrainingEnv(gymnasium.Wrapper[Observation, Any, Observation, Any]):
             low, high = self._task.difficulty
             self._inner.targets = _LearningTargets(self._task.source((min(low, most), min(high, most))))
 
+    def _own(self, action: Any) -> int:
+        """The environment's number of an action of the policy's."""
+        number = int(self._number[int(action)])
+        if number == _OTHER:
+            raise IllegalActionError(f"action {action} is of none of the operators {self._inner.codec.operators} here")
+        return number
+
+    def _widened(self, mask: BoolArray) -> BoolArray:
+        """(G,) the environment's mask in the policy's numbers."""
+        return np.where(self._number == _OTHER, False, mask[self._number])
+
     def _seen(self, observation: Observation, info: dict[str, Any]) -> Observation:
-        return observation_of(observation, info["action_mask"].astype(np.bool_), self._task.w_sc)
+        mask = self._widened(info["action_mask"].astype(np.bool_))
+        info["action_mask"] = mask.astype(np.int8)
+        return observation_of(observation, mask, self._price, self._task.faces)
+
+
+def _numbers(own: ActionCodec, known: ActionCodec) -> IntArray:
+    """(G,) the number in codec `own` of each action of `known`; _OTHER for those of operators that it has not."""
+    numbers = np.full(known.n_actions, _OTHER)
+    numbers[0] = 0  # STOP
+    for name in own.operators:
+        places = own.indices_of(name)
+        numbers[known.indices_of(name)] = np.arange(places.start, places.stop)
+    return numbers
+
+
+def _from(state: EnvState) -> dict[str, Any]:
+    """The options of a reset that begins where an episode began, at another price."""
+    return {"target": state.silhouette, "mesh": state.state.mesh}
 
 
 class NativeVecEnv(VecEnv):

@@ -20,11 +20,13 @@ from torch.nn import functional
 from agents.rl import reading
 from agents.rl.config import NetConfig, SpaceSpec
 from agents.rl.links import Links, averaged, links_of, summed, taken
+from autopoly_env.mesh import FACE_RULES
 from autopoly_env.observation import Observer
 from autopoly_env.operators import Action, ActionCodec, operator_named
 
 NEVER = -1e8  # logit of what is not legal
 N_FACTS = 10  # numbers about the whole, beside the pictures
+N_RULES = 1 + len(FACE_RULES)  # numbers more where the rules are noted: the price's logarithm, and which rule holds
 
 
 class Elements(NamedTuple):
@@ -95,7 +97,7 @@ class MeshEncoder(nn.Module):
         n_points = reading.N_NEAR + reading.N_FAR + reading.N_INNER
         n_read = 2 * n_points + 2 * config.widths[0] + reading.N_SHAPE
         self.begin = nn.Sequential(nn.Linear(n_read, width), nn.ReLU(), nn.Linear(width, width))
-        self.facts = nn.Linear(N_FACTS, width)
+        self.facts = nn.Linear(N_FACTS + N_RULES * bool(spec.faces), width)
         self.rounds = nn.ModuleList(Round(width) for _ in range(config.n_rounds))
         self.end = nn.Sequential(nn.Linear(3 * width, width), nn.ReLU())
 
@@ -126,14 +128,18 @@ class MeshEncoder(nn.Module):
         return torch.cat((*(some.flatten(1) for some in seen), reading.shape_values(frame, links)), -1)
 
     def _facts(self, observation: Mapping[str, Tensor], pictures: Tensor) -> Tensor:
-        """(B, N_FACTS) counts, steps left, price of an element, and how far rendering and target agree."""
+        """(B, N_FACTS, and N_RULES more) counts, steps left, price, how far rendering and target agree; price, rule."""
         shown, target = pictures.unbind(1)
         union = torch.maximum(shown, target).mean((1, 2))
         common = torch.minimum(shown, target).mean((1, 2))
         areas = torch.stack((common / union.clamp(min=1e-6), union - common, common, shown.mean((1, 2))), -1)
         counts = observation["counts"].float() / 16.0
         left = observation["remaining_steps"].float() / self.spec.max_steps
-        return torch.cat((counts, left, observation["price"].float(), areas), -1)
+        price = observation["price"].float()
+        facts = [counts, left, price, areas]
+        if self.spec.faces:
+            facts += [price.clamp(min=1e-3).log10(), observation["rule"].float()]
+        return torch.cat(facts, -1)
 
 
 class PointerHead(nn.Module):
@@ -146,16 +152,22 @@ class PointerHead(nn.Module):
         # by kind of element: of each output the number of the first element's action, and the step to the next's
         self._places: dict[str, list[tuple[int, int]]] = {}
         self._bases: dict[str, str] = {}  # by kind: the elements of the mesh that it lies at
+        self._columns: dict[str, list[tuple[str, int]]] = {}
         for name in spec.operators:
             kind = operator_named(name).element
             start = codec.encode(Action(name, 0))
             self._places.setdefault(kind.name, []).extend((start + k, kind.n_each) for k in range(kind.n_each))
             self._bases[kind.name] = kind.base
+            self._columns.setdefault(kind.name, []).extend((name, k) for k in range(kind.n_each))
         width = config.width
         self.elements = nn.ModuleDict({kind: nn.Linear(width, width) for kind in self._places})
         self.whole = nn.ModuleDict({kind: nn.Linear(width, width, bias=False) for kind in self._places})
         self.logits = nn.ModuleDict({kind: nn.Linear(width, len(places)) for kind, places in self._places.items()})
         self.stop = nn.Sequential(nn.Linear(width, width), nn.ReLU(), nn.Linear(width, 1))
+
+    def columns(self, kind: str) -> list[tuple[str, int]]:
+        """What each output for an element of a kind is the logit of: an operator, and which of the elements there."""
+        return self._columns[kind]
 
     def forward(self, encoded: Encoded) -> Tensor:
         whole = encoded.whole

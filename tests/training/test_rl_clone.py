@@ -83,17 +83,17 @@ def test_turned_sample__is_what_the_turned_mesh_shows(way: int, trajectory: Traj
     settings = clone_config(shards)
     one = prepared(trajectory, settings.env.spec())[-1]
     sample = clone_sample(one, 1.0, way, settings)
-    n_vertices, n_edges, _, n_corners = one.seen["counts"].tolist()
+    n_vertices, n_edges, _, n_corners = one.seen.observation["counts"].tolist()
     points = sample["vertices"].reshape(-1, 2)[:n_vertices].astype(float)
     corners = sample["faces"].reshape(-1, 2)[:n_corners]
-    faces = [tuple(corners[corners[:, 0] == f, 1].tolist()) for f in range(int(one.seen["counts"][2]))]
+    faces = [tuple(corners[corners[:, 0] == f, 1].tolist()) for f in range(int(one.seen.observation["counts"][2]))]
     mesh = PolyMesh.from_faces(points, faces)  # which refuses areas that are not positive
     seen = observer_of(settings.env.spec()).observe(mesh, sample["target"], 5)
     assert np.array_equal(seen["edges"], sample["edges"]) and np.array_equal(seen["faces"], sample["faces"])
     assert np.abs(seen["rendering"].astype(int) - sample["rendering"]).max() <= 1
     spec = settings.env.spec()
     assert np.array_equal(ActionCodec(spec.operators, spec.max_vertices).legal_mask(mesh), sample["action_mask"] > 0)
-    assert set(turned_observation(one.seen, way)) == set(one.seen) and n_edges > 0
+    assert set(turned_observation(one.seen.observation, way)) == set(one.seen.observation) and n_edges > 0
 
 
 def test_clone__learns_goes_on_and_can_be_begun_with(shards: Path, tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from agents.guided.config import NfapConfig, WarpConfig
 from autopoly_env.arrays import AnyArray
 from autopoly_env.compute import set_threads
 from autopoly_env.errors import ConfigError
-from autopoly_env.mesh import FaceRule
+from autopoly_env.mesh import FaceRule, face_rule
 from autopoly_env.operators import operator_named, preset
 from autopoly_env.workers import no_interrupts
 from training.networks.labelling import SourceConfig, build_trajectory
@@ -93,6 +93,23 @@ class Stored:
 
     def draw(self, rng: np.random.Generator) -> Trajectory:
         return self[int(rng.integers(len(self)))]
+
+
+@dataclass(frozen=True)
+class Made:
+    """Under which rules the constructions of shards were made."""
+
+    operators: str = "full"
+    faces: FaceRule = "any"
+
+    @classmethod
+    def of(cls, folder: str) -> "Made":
+        """As the folder's meta.json says; where nothing legible says so, as they were made before it did."""
+        try:
+            source = json.loads((Path(folder) / "meta.json").read_text(encoding="utf-8"))["source"]
+            return cls(source["operators"], face_rule(source.get("faces", "any")))
+        except (OSError, ValueError, KeyError, TypeError, AttributeError):
+            return cls()
 
 
 def stored(folders: str | Sequence[str], held_out: bool = False) -> Stored:
@@ -205,6 +222,16 @@ def check_known(network: NfapConfig, labels: LabelConfig, trajectories: Trajecto
     if not known[0] <= low <= high <= known[1]:
         said = "is told no price" if network.w_sc is None else f"knows w_sc {known[0]:g} to {known[1]:g}"
         raise ConfigError(f"the labels are for w_sc {low:g} to {high:g}, the network {said}: give another net.w_sc")
+
+
+@dataclass(frozen=True)
+class InTurn(Dataset[Sample]):
+    """Samples of several streams in turn."""
+
+    streams: Sequence[Dataset[Sample]]
+
+    def __getitem__(self, i: int) -> Sample:
+        return self.streams[i % len(self.streams)][i // len(self.streams)]
 
 
 def _window(

@@ -3,39 +3,47 @@
 Letters: S states of a construction, k the number of one of them, A actions, G actions of the codec, H corners.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from torch.utils.data import Dataset
 
 from agents.rl.config import NetConfig, SpaceSpec
 from agents.rl.network import observer_of
-from agents.rl.player import observation_of
+from agents.rl.player import allowed, observation_of
 from autopoly_env.arguments import above, at_least
 from autopoly_env.arrays import BoolArray, Float32Array, IntArray
 from autopoly_env.errors import ConfigError, IllegalActionError
+from autopoly_env.mesh import FaceRule
 from autopoly_env.observation import PADDING, Observation
-from autopoly_env.operators import Action, ActionCodec, operator_named
+from autopoly_env.operators import Action, ActionCodec, operator_named, preset
 from training.networks.samples import LabelConfig, Sample
-from training.networks.streams import Stored
+from training.networks.streams import Made, Stored
 from training.networks.trainer import OptimConfig, RunConfig
 from training.networks.trajectories import Labelled, Trajectory
 from training.policies.config import EnvConfig
 
 PICTURES = ("rendering", "target")
-_HOPELESS = -1e3  # r_all points: gain of an action whose outcome is not known
+HOPELESS = -1e3  # r_all points: gain of an action whose outcome is not known
 
 
 @dataclass(frozen=True)
 class CloneData:
     """Where samples come from, and how they are labelled."""
 
-    shards: str = "runs/expert"
-    held_out: str = "runs/held_out"
+    shards: str = "runs/expert"  # folders of make_expert, with commas between them
+    held_out: str = "runs/held_out"  # the same of held-out targets
+    plays: str = ""  # a folder of training.improve's plays: half of the samples; all of them where `shards` is empty
     n_held_out: int = 512  # samples to measure with, rounded up to whole batches of 64
     temperature: float = 0.5  # r_all points: of the softmax over what actions gain
+    least_gain: float = 0.05  # r_all points below which a state of a play teaches nothing
 
     def __post_init__(self) -> None:
+        if not (self.shards or self.plays):
+            raise ConfigError("shards and plays are empty: expected one of them")
+        at_least(0, least_gain=self.least_gain)
         at_least(1, n_held_out=self.n_held_out)
         above(0, temperature=self.temperature)
 
@@ -51,6 +59,7 @@ class CloneConfig:
     optim: OptimConfig = field(default_factory=OptimConfig)
     run: RunConfig = field(default_factory=RunConfig)
     n_exam: int = 48  # unseen targets of each task that the result is evaluated on
+    init: str = ""  # weights to begin with: a .safetensors file
 
     def __post_init__(self) -> None:
         if self.n_exam < 1 or not self.value_weight >= 0.0:
@@ -58,9 +67,13 @@ class CloneConfig:
                 f"n_exam {self.n_exam}, value_weight {self.value_weight}: expected at least 1 and at least 0"
             )
 
-    def prices(self) -> tuple[float, ...]:
-        """Of an element, as the tasks have them."""
-        return tuple(sorted({task.w_sc for task in self.env.courses}))
+    def price(self, faces: FaceRule, rng: np.random.Generator) -> float:
+        """Of an element, as a task of that rule of faces has it. Raises ConfigError where there is none."""
+        tasks = sorted({task.prices: task for task in self.env.courses if task.faces == faces}.items())
+        if not tasks:
+            raise ConfigError(f"env.courses: none has faces={faces}, which shards are of; add one")
+        _, task = tasks[int(rng.integers(len(tasks)))]
+        return task.w_sc if isinstance(task.w_sc, float | int) else task.price_at(rng.random())
 
 
 # --- one sample ---
@@ -70,20 +83,53 @@ class CloneConfig:
 class Prepared:
     """A labelled state as the policy sees it, but for the price."""
 
-    seen: Observation
-    mask: BoolArray  # (G,)
+    seen: "Turning"
     index: IntArray  # (A,) number of each action; -1 where there is no room for it
-    mirrored: IntArray  # (G,) the number of each action in the mirror image of the mesh
     state: Labelled
     totals: Float32Array  # (S - k, 3) score of this state and of all later ones of the construction
+
+
+@dataclass(frozen=True)
+class Turning:
+    """A state as the policy sees it, but for the price, that can be turned."""
+
+    observation: Observation
+    mask: BoolArray  # (G,)
+    codec: ActionCodec
+
+    @cached_property
+    def mirrored(self) -> IntArray:
+        """(G,) where each action goes when every face is wound the other way: corners change places, others stay."""
+        order = np.arange(self.codec.n_actions)
+        swap = _reversed_corners(self.observation["faces"])
+        for name in self.codec.operators:
+            if operator_named(name).element.base == "corner":
+                start = self.codec.encode(Action(name, 0))
+                order[start : start + len(swap)] = start + swap
+        return order
+
+    def sample(
+        self, way: int, w_sc: float, faces: FaceRule, arrays: dict[str, Float32Array], value: Float32Array
+    ) -> Sample:
+        """It, mirrored (bit 0: x, bit 1: y) and transposed (bit 2), with `arrays` (G,) and its value (1,)."""
+        seen = observation_of(turned_observation(self.observation, way), self.mask, w_sc, faces)
+        sample: Sample = {**seen, **arrays, "value": value}
+        if way.bit_count() % 2:
+            for name in ("action_mask", *arrays):
+                moved = np.empty_like(sample[name])
+                moved[self.mirrored] = sample[name]
+                sample[name] = moved
+        return sample
 
 
 class CloneStream(Dataset[Sample]):
     """Endless samples by number; number i depends on (seed, i) alone."""
 
-    def __init__(self, trajectories: Stored, config: CloneConfig, seed: int, turn: bool = True) -> None:
+    def __init__(
+        self, trajectories: Stored, config: CloneConfig, seed: int, turn: bool = True, made: Made | None = None
+    ) -> None:
         self._trajectories, self._config, self._seed, self._turn = trajectories, config, seed, turn
-        self._spec = config.env.spec()
+        self._spec, self._made = config.env.spec(), made or Made()
         self._prepared: dict[int, list[Prepared]] = {}  # by number of the construction: unpacking takes longer
 
     def __getitem__(self, i: int) -> Sample:
@@ -92,20 +138,22 @@ class CloneStream(Dataset[Sample]):
         while not states:
             states = self._states(int(rng.integers(len(self._trajectories))))
         one = states[int(rng.integers(len(states)))]
-        prices = self._config.prices()
-        w_sc = prices[int(rng.integers(len(prices)))]
-        return clone_sample(one, w_sc, int(rng.integers(8)) if self._turn else 0, self._config)
+        w_sc = self._config.price(self._made.faces, rng)
+        return clone_sample(one, w_sc, int(rng.integers(8)) if self._turn else 0, self._config, self._made.faces)
 
     def _states(self, number: int) -> list[Prepared]:
         if number not in self._prepared:
-            self._prepared[number] = prepared(self._trajectories[number], self._spec)
+            self._prepared[number] = prepared(self._trajectories[number], self._spec, self._made.operators)
         return self._prepared[number]
 
 
-def prepared(trajectory: Trajectory, spec: SpaceSpec) -> list[Prepared]:
-    """The states of a construction in which something may be done and that the padding has room for."""
+def prepared(trajectory: Trajectory, spec: SpaceSpec, operators: str = "full") -> list[Prepared]:
+    """The states of a construction in which something may be done and that the padding has room for.
+
+    `operators` are those that it was made with.
+    """
     observer, codec = observer_of(spec), ActionCodec(spec.operators, spec.max_vertices)
-    picture = observer.picture_of(trajectory.silhouette)
+    picture, names = observer.picture_of(trajectory.silhouette), [operator.name for operator in preset(operators)]
     found = []
     for k, state in enumerate(trajectory.states):
         try:
@@ -114,32 +162,21 @@ def prepared(trajectory: Trajectory, spec: SpaceSpec) -> list[Prepared]:
             continue
         if state.actions and k < spec.max_steps:
             scores = np.stack([later.score for later in trajectory.states[k:]])
-            seen = observer.observe(state.mesh, picture, spec.max_steps - k)
-            mask, index = codec.legal_mask(state.mesh), _numbers(codec, state)
-            found.append(Prepared(seen, mask, index, _mirrored(codec, seen), state, scores))
+            mask = allowed(codec, state.mesh, names)
+            seen = Turning(observer.observe(state.mesh, picture, spec.max_steps - k), mask, codec)
+            found.append(Prepared(seen, numbers_of(codec, state.actions), state, scores))
     return found
 
 
-def _numbers(codec: ActionCodec, state: Labelled) -> IntArray:
+def numbers_of(codec: ActionCodec, actions: Sequence[Action]) -> IntArray:
     """(A,) the codec's number of each action, -1 where it has none."""
     numbers = []
-    for action in state.actions:
+    for action in actions:
         try:
             numbers.append(codec.encode(action))
         except IllegalActionError:
             numbers.append(-1)
-    return np.array(numbers)
-
-
-def _mirrored(codec: ActionCodec, seen: Observation) -> IntArray:
-    """(G,) where each action goes when every face is wound the other way: corners change places, others stay."""
-    order = np.arange(codec.n_actions)
-    swap = _reversed_corners(seen["faces"])
-    for name in codec.operators:
-        if operator_named(name).element.base == "corner":
-            start = codec.encode(Action(name, 0))
-            order[start : start + len(swap)] = start + swap
-    return order
+    return np.array(numbers, np.int64)
 
 
 def _reversed_corners(faces: IntArray) -> IntArray:
@@ -152,29 +189,22 @@ def _reversed_corners(faces: IntArray) -> IntArray:
     return 2 * first + size - 1 - np.arange(len(owners))
 
 
-def clone_sample(one: Prepared, w_sc: float, way: int, config: CloneConfig) -> Sample:
-    """What the policy sees, mirrored (bit 0: x, bit 1: y) and transposed (bit 2), and what it is to answer."""
+def clone_sample(one: Prepared, w_sc: float, way: int, config: CloneConfig, faces: FaceRule = "any") -> Sample:
+    """What the policy sees, turned as `Turning.sample` says, and what it is to answer."""
     labels = LabelConfig(temperature=config.data.temperature)
-    policy, gains = np.zeros(len(one.mask)), np.full(len(one.mask), _HOPELESS)
+    policy, gains = np.zeros(len(one.seen.mask)), np.full(len(one.seen.mask), HOPELESS)
     probabilities, known = labels.policy(one.state, w_sc), one.index >= 0
     policy[0], gains[0] = probabilities[0], 0.0
     policy[one.index[known]] = probabilities[1:][known]
-    gains[one.index[known]] = np.maximum(labels.gains(one.state, w_sc)[known], _HOPELESS)
-    policy *= one.mask
+    gains[one.index[known]] = np.maximum(labels.gains(one.state, w_sc)[known], HOPELESS)
+    policy *= one.seen.mask
     totals = one.totals @ np.array((labels.w_sm, -w_sc, -labels.w_si))
     value = config.env.reward_scale * (totals.max() - totals[0])
-    sample = {
-        **observation_of(turned_observation(one.seen, way), one.mask, w_sc),
+    arrays = {
         "policy": (policy / max(policy.sum(), 1e-9)).astype(np.float32),
         "gains": gains.astype(np.float32),
-        "value": np.array((value,), np.float32),
     }
-    if way.bit_count() % 2:
-        for name in ("action_mask", "policy", "gains"):
-            moved = np.empty_like(sample[name])
-            moved[one.mirrored] = sample[name]
-            sample[name] = moved
-    return sample
+    return one.seen.sample(way, w_sc, faces, arrays, np.array((value,), np.float32))
 
 
 def turned_observation(seen: Observation, way: int) -> Observation:

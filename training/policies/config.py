@@ -1,12 +1,13 @@
 """Settings of `training.train_rl`, and how a run notes and compares them."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 from agents.rl.config import NetConfig, SpaceSpec, TaskSpec
 from autopoly_env.arguments import above, at_least, share
 from autopoly_env.errors import ConfigError
+from autopoly_env.mesh import FACE_RULES
 from autopoly_env.operators import preset
 from autopoly_env.shown import short
 
@@ -27,7 +28,7 @@ class EnvConfig:
     """The environments."""
 
     courses: tuple[TaskSpec, ...] = (TaskSpec(), TaskSpec("objects", 0.3))  # the tasks; environments take them in turn
-    operators: str = "full"  # that the policy has
+    operators: str = "full"  # that the policy has, beside those of its courses
     resolution: int = 64  # pixels a side at which meshes are fitted and scored while learning
     obs_resolution: int = 64  # pixels a side of the observed pictures
     max_steps: int = 24
@@ -45,9 +46,17 @@ class EnvConfig:
         self.spec()
 
     def spec(self) -> SpaceSpec:
-        """The spaces that the policy is made for."""
-        operators = tuple(operator.name for operator in preset(self.operators))
-        return SpaceSpec(operators, self.max_vertices, self.obs_resolution, self.max_steps)
+        """The spaces that the policy is made for: the operators of all courses, each once; their rules and prices."""
+        lists = [self.operators, *(task.policy_operators for task in self.courses if task.policy_operators)]
+        operators = dict.fromkeys(operator.name for names in lists for operator in preset(names))
+        faces = tuple(rule for rule in FACE_RULES if rule in {task.faces for task in self.courses})
+        prices = [price for task in self.courses for price in task.prices]
+        spaces = (self.max_vertices, self.obs_resolution, self.max_steps)
+        return SpaceSpec(tuple(operators), *spaces, faces, (min(prices), max(prices)))
+
+    def tasks(self) -> tuple[TaskSpec, ...]:
+        """The courses, with the operators of each."""
+        return tuple(replace(task, policy_operators=task.policy_operators or self.operators) for task in self.courses)
 
 
 @dataclass(frozen=True)

@@ -3,12 +3,13 @@
 All episodes run at the same time, so that the network looks at many states at once.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from agents.rl.network import MeshNet
+from agents.rl.config import TaskSpec
+from agents.rl.network import NEVER, MeshNet
 from agents.rl.player import Player
 from autopoly_env.arrays import IntArray
 from autopoly_env.compute import Routine, run_all
@@ -32,13 +33,19 @@ class Evaluation:
 
     @classmethod
     def of(
-        cls, name: str, silhouettes: Iterable[Silhouette], w_sc: float, operators: Sequence[str], resolution: int
+        cls, name: str, silhouettes: Sequence[Silhouette], task: TaskSpec, operators: Sequence[str], resolution: int
     ) -> "Evaluation":
-        """An evaluation on these targets, at a resolution in pixels a side."""
-        names, weights = ",".join(operators), ScoreWeights(w_sc=w_sc)
+        """An evaluation on these targets, at a resolution in pixels a side; prices of a range are taken in turn."""
+        names, n = ",".join(operators), len(silhouettes)
+        prices = [task.price_at((k + 0.5) / n) for k in range(n)]
         return cls(
             name,
-            tuple(Simulator(one, operators=names, resolution=resolution, weights=weights) for one in silhouettes),
+            tuple(
+                Simulator(
+                    one, operators=names, resolution=resolution, weights=ScoreWeights(w_sc=w_sc), faces=task.faces
+                )
+                for one, w_sc in zip(silhouettes, prices, strict=True)
+            ),
         )
 
     def run(self, player: Player) -> "Metrics":
@@ -77,8 +84,8 @@ def play_all(player: Player, simulators: Sequence[Simulator]) -> list[list[State
     for _ in range(player.spec.max_steps):
         if not going:
             break
-        logits = player.logits([simulators[k] for k in going], [episodes[k][-1] for k in going])
-        orders = [np.argsort(-row, kind="stable") for row in logits]
+        logits = player.logits([simulators[k] for k in going], [episodes[k][-1] for k in going], exact=False)
+        orders = [np.argsort(-row, kind="stable")[: int((row > 0.5 * NEVER).sum())] for row in logits]
         steps = (_step(player, simulators[k], episodes[k][-1], order) for k, order in zip(going, orders, strict=True))
         made = run_all(steps)
         still = []
@@ -91,9 +98,8 @@ def play_all(player: Player, simulators: Sequence[Simulator]) -> list[list[State
 
 
 def _step(player: Player, simulator: Simulator, state: State, order: IntArray) -> Routine[State | None]:
-    """The state after the likeliest action that there is room for; None where that is STOP."""
-    legal = player.legal_mask(simulator, state)
-    for index in order[: int(legal.sum())]:
+    """The state after the first action in order that there is room for; None where that is STOP."""
+    for index in order:
         action: Action = player.codec.decode(int(index))
         if action == STOP:
             return None
@@ -106,15 +112,15 @@ def _step(player: Player, simulator: Simulator, state: State, order: IntArray) -
 
 def evaluations_of(env: EnvConfig, n: int, resolution: int) -> tuple[Evaluation, ...]:
     """An evaluation on `n` held-out targets for each task; those of a folder of images have been seen."""
-    operators = env.spec().operators
+    spec = env.spec()
     evaluations: list[Evaluation] = []
-    for number, task in enumerate(env.courses):
+    for number, task in enumerate(env.tasks()):
         source = task.source()
         silhouettes = [source.sample(seed) for seed in HELD_OUT[:n]]
         name = task.targets if task.targets in ("construction", "objects") else "images"
         if name in [known.name for known in evaluations]:
             name = f"{name}{number}"
-        evaluations.append(Evaluation.of(name, silhouettes, task.w_sc, operators, resolution))
+        evaluations.append(Evaluation.of(name, silhouettes, task, task.operators_of(spec), resolution))
     return tuple(evaluations)
 
 

@@ -1,8 +1,9 @@
 """The policy that comes with the project: weights and model card, from a run's folder to where the agents look."""
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from agents.guided.layers import n_parameters
 from agents.rl.weights import SHIPPED, PolicyMeta, load_policy
@@ -28,8 +29,8 @@ def card(meta: PolicyMeta, n: int, arguments: Sequence[str]) -> str:
     env = meta.training.get("env", {})
     init = meta.training.get("run", {}).get("init", "")
     begin = f"It went on from `{init}`." if init else "It began with random weights."
-    tasks = "; ".join(f"{task['targets']} at w_sc {task['w_sc']:g}" for task in env.get("courses", []))
-    spec = ", ".join(f"{k} {v if not isinstance(v, list) else ' '.join(v)}" for k, v in meta.spec.items())
+    tasks = "; ".join(_told(task) for task in env.get("courses", []))
+    spec = ", ".join(f"{k} {v if not isinstance(v, list) else ' '.join(map(str, v))}" for k, v in meta.spec.items())
     return f"""# {meta.algorithm}
 
 A policy that reads a mesh, its rendering and a target silhouette, and points at the next modelling action. {n}
@@ -53,3 +54,11 @@ of an element is an input, but only the prices above were trained. After {meta.s
 
 **Settings.** In the `.json` beside the weights, under `training`.
 """
+
+
+def _told(task: Mapping[str, Any]) -> str:
+    """A course in words."""
+    low, *high = w_sc if isinstance(w_sc := task["w_sc"], list) else [w_sc]
+    price = f"{low:g} to {high[0]:g}" if high else f"{low:g}"
+    faces = task.get("faces", "any")
+    return f"{task['targets']} at w_sc {price}" + (f", faces={faces}" if faces != "any" else "")

@@ -185,7 +185,7 @@ def test_near_points__lie_on_both_sides_of_the_edge() -> None:
 @pytest.mark.parametrize(
     ("other", "complaint"),
     [
-        ({"operators": SpaceSpec().operators[:4]}, "operators paper; .*operators full"),
+        ({"operators": ("edge_cap", "edge_subdivide")}, "operators edge_cap,edge_subdivide; .*operators full"),
         ({"max_vertices": 20}, "max_vertices 20; .*max_vertices 48"),
         ({"obs_resolution": 32}, "obs_resolution 32; .*obs_resolution 64"),
         ({"max_steps": 3}, "max_steps 3; .*max_steps 24"),

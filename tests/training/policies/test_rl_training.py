@@ -162,7 +162,8 @@ def test_zip_of_an_older_version__can_be_begun_with_and_loaded(trained: dict[str
     model.policy_kwargs["rules"] = Rules(**asdict(model.policy_kwargs.pop("spec")))
     model.save(path)
     again = PPO.load(path, device="cpu")
-    assert net.spec == net_of(again.policy).spec == SpaceSpec(max_vertices=16, obs_resolution=32, max_steps=5)
+    spec = SpaceSpec(max_vertices=16, obs_resolution=32, max_steps=5, faces=("any",), w_sc=(0.3, 1.0))
+    assert net.spec == net_of(again.policy).spec == spec
     zipped = train_rl.initial_net(config(f"run.init={path}"), trust=True)
     assert all(torch.equal(a, b) for a, b in zip(net.parameters(), zipped.parameters(), strict=True))
 
