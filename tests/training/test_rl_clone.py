@@ -8,13 +8,16 @@ import numpy as np
 import pytest
 import torch
 
+from agents.rl.config import NetConfig
 from agents.rl.network import MeshNet, observer_of
 from agents.rl.weights import load_policy, save_policy
 from autopoly_env.errors import AutoPolyError, ConfigError
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import ActionCodec
+from autopoly_env.operators import OPERATORS, PRESETS, Action, ActionCodec
 from tests.helpers.policies import ENV, NET, config
 from training import rl_clone, train_rl
+from training.improvement.playing import PlayConfig, play
+from training.improvement.plays import Play
 from training.networks.labelling import SourceConfig, build_trajectory
 from training.networks.samples import LabelConfig
 from training.networks.streams import collate, stored
@@ -22,6 +25,7 @@ from training.networks.trainer import Process, train
 from training.networks.trajectories import Shard, Trajectory
 from training.options import read_config
 from training.policies.clone_samples import CloneConfig, clone_sample, prepared, turned_observation
+from training.policies.play_samples import play_sample, searched
 from training.rl_clone import CloneTask
 
 torch.set_num_threads(1)  # as tests run beside each other
@@ -134,3 +138,67 @@ def test_weights__are_written_and_read_back(tmp_path: Path) -> None:
     again, meta = load_policy(save_policy(tmp_path / "p.safetensors", net, "clone", {"a": 1}, {"b": 2.0}))
     assert again.spec == net.spec and meta.training == {"a": 1} and meta.metrics == {"b": 2.0}
     assert issubclass(ConfigError, AutoPolyError) and replace(settings, algorithm="ppo").options() == settings.ppo
+
+
+# --- what search found ---
+
+BOTH = (
+    'env.courses=[{"targets": "objects", "w_sc": [0.1, 1.5], "faces": "quads", "policy_operators": "modeller"}, '
+    '{"targets": "construction", "w_sc": [0.1, 1.5]}]'
+)
+PLAYED = PlayConfig(refits=12, n_runs=1, modeller=1.0, n_least=1)
+
+
+@pytest.fixture(scope="module")
+def plays(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("plays")
+    for k in range(3):
+        play(PLAYED, seed=0, round_=1, number=k).save(folder / f"{k}.json")
+    return folder
+
+
+def test_play_sample__has_what_was_found_behind_each_action(plays: Path, shards: Path) -> None:
+    settings = clone_config(shards, BOTH)
+    spec = settings.env.spec()
+    assert spec.operators == tuple(OPERATORS) and spec.faces == ("any", "quads") and spec.w_sc == (0.1, 1.5)
+    codec, played = ActionCodec(spec.operators, spec.max_vertices), Play.load(plays / "0.json")
+    kept = [one for one in played.states if one.best - one.total >= 0.05 and len(one.vertices) <= spec.max_vertices]
+    made = searched(played, spec, 0.05)
+    assert kept and len(made) == len(kept)
+    for one, state in zip(made, kept, strict=True):
+        sample = play_sample(one, 0, settings)
+        assert sample["rule"].tolist() == [0.0, 0.0, 1.0] and sample["price"][0] == np.float32(played.w_sc)
+        assert sample["value"][0] == pytest.approx(0.1 * (state.best - state.total), abs=1e-6)
+        found = {codec.encode(Action(*a)): v for a, v in zip(state.actions, state.found, strict=True)}
+        assert {k for k in found if sample["policy"][k] > 0} <= {k for k, v in found.items() if v is not None}
+        best = max((k for k, v in found.items() if v is not None), key=lambda k: found[k] or 0.0)
+        gain = (found[best] or 0.0) - state.total
+        assert sample["gains"][best] == pytest.approx(gain, abs=1e-3) and sample["gains"][0] == 0.0
+        assert sample["policy"][0] == pytest.approx(sample["policy"][best] * np.exp(-gain / 0.5), abs=1e-6)
+        own = {operator.name for operator in PRESETS["modeller"]} | {"stop"}
+        assert {codec.decode(int(k)).operator for k in np.flatnonzero(sample["action_mask"])} <= own
+
+
+def test_clone__learns_from_plays_and_shards_and_begins_with_weights_of_fewer_operators(
+    plays: Path, shards: Path, tmp_path: Path
+) -> None:
+    spec = replace(clone_config(shards).env.spec(), faces=(), w_sc=())
+    old = save_policy(tmp_path / "old.safetensors", MeshNet(NetConfig(**NET), spec), "ppo", {}, {})
+    settings = clone_config(shards, BOTH, f"data.plays={plays}", f"init={old}", "optim.n_steps=2")
+    task = CloneTask(settings)
+    assert {tuple(task.stream[k]["rule"].tolist()) for k in range(4)} == {(1.0, 0.0, 0.0), (0.0, 0.0, 1.0)}
+    train(task, settings.optim, settings.run, {"any": 1}, tmp_path / "run", Process())
+    assert task.net.spec == settings.env.spec()
+
+
+def test_clone_of_a_rule_that_no_course_has__is_refused(shards: Path, tmp_path: Path) -> None:
+    source = SourceConfig(n_steps=2, resolution=64, operators="modeller", faces="quads", traced=0.0)
+    folder = tmp_path / "quads"
+    folder.mkdir()
+    Shard.pack([build_trajectory(source, 1)]).save(folder / "shard_00000.npz")
+    (folder / "meta.json").write_text(json.dumps({"source": {"operators": "modeller", "faces": "quads"}}))
+    assert clone_config(folder, BOTH).price("quads", np.random.default_rng(0)) > 0.1
+    with pytest.raises(ConfigError, match=r"env\.courses: none has faces=quads"):
+        CloneTask(clone_config(folder)).stream[0]
+    with pytest.raises(ConfigError, match="faces=quads: expected source=teacher or search, and traced=0"):
+        SourceConfig(faces="quads")

@@ -1,5 +1,8 @@
 """Environments for training policies: many at once, courses, difficulties."""
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 import torch
@@ -7,8 +10,11 @@ from stable_baselines3.common.vec_env import SubprocVecEnv
 
 from agents.rl.config import TaskSpec
 from agents.rl.envs import EnvFactory, NativeVecEnv, TrainingEnv, make_vec_env
+from autopoly_env.errors import ConfigError, IllegalActionError
+from autopoly_env.mesh import check_faces
+from autopoly_env.operators import OPERATORS, PRESETS, STOP, ActionCodec
 from autopoly_env.targets import LEARNING
-from tests.helpers.policies import factory
+from tests.helpers.policies import config, factory
 
 torch.set_num_threads(1)  # as tests run beside each other
 
@@ -92,3 +98,75 @@ def test_curriculum__draws_easy_constructions_first() -> None:
     assert env.unwrapped.targets.source.difficulty == (1, 1)
     env.set_difficulty(9)
     assert env.unwrapped.targets.source.difficulty == (1, 5)
+
+
+# --- styles and prices ---
+
+MODELLER = TaskSpec("objects", (0.1, 1.5), faces="quads", policy_operators="modeller")
+BOTH = EnvFactory(config().env.spec(), resolution=32, n_plays=2)
+BOTH = replace(
+    BOTH, spec=replace(BOTH.spec, operators=tuple(OPERATORS), faces=("any", "quads"), w_sc=(0.1, 1.5), max_steps=8)
+)
+
+
+@pytest.mark.parametrize("task", [MODELLER, TaskSpec(policy_operators="full")], ids=["modeller", "paper"])
+def test_course__steps_only_legal_actions_of_its_own_operators(task: TaskSpec) -> None:
+    env, codec = BOTH.make(task), ActionCodec(tuple(OPERATORS), BOTH.spec.max_vertices)
+    own = {operator.name for operator in PRESETS[task.policy_operators]}
+    rng = np.random.default_rng(0)
+    seen, _ = env.reset(seed=2)
+    taken = set()
+    for _ in range(40):
+        legal = np.flatnonzero(seen["action_mask"])
+        assert {codec.decode(int(k)).operator for k in legal} <= own | {STOP.operator}
+        assert np.array_equal(env.action_masks(), seen["action_mask"] > 0) and seen["rule"][2] == (task is MODELLER)
+        before, number = env.unwrapped.state, int(rng.choice(legal))  # type: ignore[attr-defined]
+        seen, _, over, _, info = env.step(number)
+        after = env.unwrapped.state  # type: ignore[attr-defined]
+        check_faces(after.mesh, task.faces, "the mesh")
+        assert not info["invalid_action"] and after.action in (None, codec.decode(number))
+        assert after.action is not None or after.mesh is before.mesh  # for which there was no room
+        taken.add(after.action.operator if after.action else "")
+        if over:
+            seen, _ = env.reset()
+    assert len(taken - {"", STOP.operator}) > 2
+    other = next(name for name in OPERATORS if name not in own)
+    with pytest.raises(IllegalActionError, match="of none of the operators"):
+        env.step(codec.indices_of(other).start)
+
+
+def test_prices__are_drawn_each_episode_by_the_seed_and_charged() -> None:
+    def prices(seed: int) -> list[float]:
+        env = BOTH.make(MODELLER)
+        return [float(env.reset(seed=seed if k == 0 else None)[0]["price"][0]) for k in range(6)]
+
+    drawn = prices(3)
+    assert drawn == prices(3) != prices(4)
+    assert len(set(drawn)) == 6 and all(0.1 <= price <= 1.5 for price in drawn)
+    many = [MODELLER.price_at(k / 10) for k in range(11)]
+    assert (many[0], many[10]) == (0.1, 1.5) and many[5] == pytest.approx((0.1 * 1.5) ** 0.5)
+    env = BOTH.make(MODELLER)
+    for seed in (1, None):  # a new target, then the same one at another price
+        seen, first = env.reset(seed=seed)
+        _, reward, _, _, info = env.step(int(np.flatnonzero(seen["action_mask"])[1]))
+        gained = 100 * (info["r_sm"] - first["r_sm"]) - 5 * (info["r_si"] - first["r_si"])
+        elements = float(info["r_sc"] - first["r_sc"])
+        assert reward == pytest.approx(0.1 * (gained - float(seen["price"][0]) * elements), abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("settings", "complaint"),
+    [
+        ({"w_sc": (1.5, 0.1)}, "w_sc .1.5, 0.1.: expected two prices of at least 0, the lower first"),
+        ({"w_sc": (0.0, 1.0)}, "w_sc"),
+        ({"policy_operators": "edge_crap"}, "edge_crap"),
+    ],
+)
+def test_course_that_is_none__is_refused(settings: dict[str, Any], complaint: str) -> None:
+    with pytest.raises(ConfigError, match=complaint):
+        TaskSpec(**settings)
+
+
+def test_course__has_no_operators_but_the_policys() -> None:
+    with pytest.raises(ConfigError, match="policy_operators modeller: the policy has full only"):
+        factory().make(MODELLER)

@@ -1,6 +1,7 @@
 """The policy network: what hangs together, what it sees, that numbering does not matter, that masks hold."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,11 +10,12 @@ import torch
 
 from agents.rl import reading
 from agents.rl.config import NetConfig, SpaceSpec
+from agents.rl.growing import grown
 from agents.rl.links import averaged, links_of, summed
 from agents.rl.network import NEVER, MeshNet, observer_of
 from agents.rl.player import observation_of
 from autopoly_env.errors import ConfigError
-from autopoly_env.mesh import PolyMesh
+from autopoly_env.mesh import FaceRule, PolyMesh
 from autopoly_env.operators import OPERATORS, ActionCodec
 
 torch.set_num_threads(1)  # as tests run beside each other
@@ -194,3 +196,37 @@ def test_near_points__lie_on_both_sides_of_the_edge() -> None:
 def test_rules__that_differ_are_both_named(other: dict[str, Any], complaint: str) -> None:
     with pytest.raises(ConfigError, match=complaint):
         SpaceSpec().check_same(SpaceSpec(**other), "this run", "theirs")
+
+
+# --- rule and price ---
+
+NOTED = replace(SPEC, faces=("any", "quads"), w_sc=(0.1, 1.5))
+
+
+def asked(net: MeshNet, w_sc: float, faces: FaceRule) -> torch.Tensor:
+    """(G,) its logits on the mesh."""
+    codec = ActionCodec(net.spec.operators, net.spec.max_vertices)
+    seen = observation_of(observer_of(net.spec).observe(mesh(), TARGET, 5), codec.legal_mask(mesh()), w_sc, faces)
+    with torch.no_grad():
+        return net({name: torch.from_numpy(array[None]) for name, array in seen.items()})[0][0]
+
+
+def test_rule_and_price__reach_the_network_that_notes_them() -> None:
+    torch.manual_seed(0)
+    noted = MeshNet(NetConfig(widths=(6, 8, 8), width=16), NOTED)
+    plain = asked(noted, 0.3, "any")
+    assert not torch.allclose(plain, asked(noted, 0.3, "quads"), atol=1e-6)
+    assert not torch.allclose(plain, asked(noted, 0.6, "any"), atol=1e-6)
+    assert torch.equal(asked(network(), 0.3, "any"), asked(network(), 0.3, "quads"))
+
+
+def test_grown_network__says_the_same_of_what_it_knew() -> None:
+    net, more = network(), replace(NOTED, operators=("loop_cut", *SPEC.operators[::-1], "vertex_merge"))
+    larger = grown(net, more)
+    known, codec = asked(net, 0.3, "any"), ActionCodec(more.operators, more.max_vertices)
+    for rule in ("any", "quads"):  # which it has yet to learn to tell apart
+        said = asked(larger, 0.3, rule)
+        assert torch.allclose(said[0], known[0], atol=1e-5)
+        for name in SPEC.operators:
+            assert torch.allclose(said[codec.indices_of(name)], known[CODEC.indices_of(name)], atol=1e-5), name
+    assert grown(net, net.spec) is net

@@ -16,8 +16,9 @@ from agents.rl.weights import load_policy, save_policy
 from agents.solution import Track
 from autopoly_env.errors import ConfigError
 from autopoly_env.mesh import PolyMesh
-from autopoly_env.operators import STOP
-from autopoly_env.simulator import Simulator
+from autopoly_env.operators import STOP, Action
+from autopoly_env.score import ScoreWeights
+from autopoly_env.simulator import Simulator, State
 from tests.helpers.drawings import L_SHAPE, painted
 from tests.helpers.networks import SPEC, policy, saved_policy
 from training import evaluate
@@ -158,6 +159,57 @@ def test_policy_that_knows_none_of_the_operators__is_refused_with_both_named(wei
     agent = make_agent("maskable-ppo", weights=weights)
     with pytest.raises(ConfigError, match=r"maskable-ppo was trained with operators full and knows none of edge_coll"):
         agent.solve(game(operators="examples.edge_collapse:edge_collapse"))
+
+
+NOTED = replace(SPEC, faces=("any", "quads"), w_sc=(0.1, 1.5))
+
+
+@pytest.mark.parametrize("name", ["maskable-ppo", "rl-prior"])
+@pytest.mark.parametrize(
+    ("settings", "complaint"),
+    [
+        ({"faces": "convex"}, "these weights know faces=any, quads, not convex: give one of them, or others"),
+        ({"weights": ScoreWeights(w_sc=3.0)}, "these weights know w_sc 0.1 to 1.5, not 3: give others"),
+    ],
+    ids=["rule", "price"],
+)
+def test_rules_and_prices_that_weights_do_not_know__are_refused_in_one_line(
+    name: str, settings: dict[str, Any], complaint: str, tmp_path: Path
+) -> None:
+    agent = make_agent(name, weights=saved_policy(tmp_path, NOTED))
+    simulator = game(**settings)
+    for ask in (agent.check, agent.solve, lambda given: agent.act(given, given.initial())):
+        with pytest.raises(ConfigError) as caught:
+            ask(simulator)
+        assert str(caught.value) == complaint
+    assert agent.suits(game(faces="quads", weights=ScoreWeights(w_sc=0.1)))
+
+
+def test_weights_from_before_rules_were_noted__play_under_any(tmp_path: Path) -> None:
+    path = Path(saved_policy(tmp_path))
+    meta = json.loads(path.with_suffix(".json").read_text())
+    for new in ("faces", "w_sc"):
+        del meta["spec"][new]
+    path.with_suffix(".json").write_text(json.dumps(meta))
+    agent, simulator = make_agent("ppo", weights=str(path)), game(faces="quads", weights=ScoreWeights(w_sc=3.0))
+    found = agent.solve(simulator, Budget(refits=12))
+    assert found.stats.n_refits > 2 and simulator.is_sane(found.mesh)
+
+
+def test_play_under_a_rule__is_that_of_the_exact_mask() -> None:
+    simulator, player = game(faces="quads", operators="full"), Player(policy())
+    state = simulator.initial()
+    for track in player.play(simulator, Track(state), Meter.unlimited()):
+        legal = simulator.legal_actions(state)
+        ranked = player.ranked(simulator, state)
+        assert set(ranked) <= set(legal) and track.state.action in legal
+        tried = [action for action in ranked if action == track.state.action or not _has_room(simulator, state, action)]
+        assert ranked[: len(tried)] == tried
+        state = track.state
+
+
+def _has_room(simulator: Simulator, state: State, action: Action) -> bool:
+    return bool(simulator.step_many([state], [action])[0])
 
 
 def test_a_mesh_that_does_not_fit__is_refused_with_both_numbers(weights: str) -> None:
