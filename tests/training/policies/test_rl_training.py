@@ -19,6 +19,8 @@ from agents.rl.player import Player
 from agents.rl.policies import net_of
 from agents.rl.weights import load_policy
 from autopoly_env.errors import ConfigError, RunError
+from autopoly_env.mesh import check_faces
+from autopoly_env.operators import preset
 from autopoly_env.score import ScoreWeights
 from autopoly_env.simulator import Simulator
 from autopoly_env.targets import HELD_OUT
@@ -298,3 +300,20 @@ def test_evaluation__is_of_held_out_targets_and_plays_as_the_agent_does(trained:
             assert following.action in ranked
             state = following
     assert isinstance(exams[0], Evaluation)
+
+
+def test_exam_of_a_course__is_under_its_rule_and_at_its_prices() -> None:
+    course = '{"targets": "objects", "w_sc": [0.1, 1.6], "faces": "quads", "policy_operators": "modeller"}'
+    env = config(f'env.courses=[{course}, {{"targets": "objects", "w_sc": 0.3}}]').env
+    quads, paper = evaluations_of(env, 2, 32)
+    assert [simulator.weights.w_sc for simulator in quads.simulators] == pytest.approx([0.2, 0.8])
+    for simulator in quads.simulators:
+        assert simulator.faces == "quads" and set(simulator.operators) == {o.name for o in preset("modeller")}
+    assert {(simulator.faces, simulator.weights.w_sc, simulator.operators) for simulator in paper.simulators} == {
+        ("any", 0.3, tuple(o.name for o in preset("full")))
+    }
+    assert env.spec().operators[:7] == tuple(o.name for o in preset("full")) and len(env.spec().operators) == 12
+    net = MeshNet(config().net, env.spec())
+    for episode in play_all(Player(net), quads.simulators):
+        for state in episode:
+            check_faces(state.mesh, "quads", "the mesh")
