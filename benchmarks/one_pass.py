@@ -17,6 +17,7 @@ from benchmarks.search_cases import Case, Found, Records, Results, made, with_op
 from training.report import Interval, bootstrap_mean
 
 POLICY, TREE, CHOICE, BEAM, RECTANGLE = "policy", "plain tree", "choice-prior", "beam", "rectangle, refitted"
+OTHER = "other policy"
 _WIDTH = 120
 
 HELP = """Measure one pass of the policy: against the tree at its own refits, ChoiceNet's one pass, and a beam.
@@ -43,6 +44,7 @@ def main_command(
     w_sc: Annotated[float, typer.Option(min=0.0, help="Price of an element.")] = 0.3,
     faces: Annotated[str, typer.Option(help="Rule of faces: quads (the modeller's style) or any.")] = "quads",
     weights: Annotated[str, typer.Option(help="Of the policy.", show_default="the project's own")] = "",
+    other: Annotated[str, typer.Option(help="Weights of a policy to compare it with.", show_default="none")] = "",
     beam: Annotated[int, typer.Option(min=0, help="Width of the beam; 0: none.")] = 0,
     beam_refits: Annotated[int, typer.Option(min=1, help="Refits of the beam at most.")] = 4000,
     beam_limit: Annotated[int, typer.Option(min=1, help="Shapes of each set for the beam.")] = 8,
@@ -56,7 +58,7 @@ def main_command(
     kept = Records(records)
     table = Table("targets", "who", "n", "r_all", "IoU", "V+E+F", "refits", "seconds", "policy − it", "policy's share")
     for name, targets in sets.items():
-        cases = _cases(targets, w_sc, faces, weights)
+        cases = _cases(targets, w_sc, faces, weights, other)
         results = kept.complete([case for some in cases.values() for case in some], 1)
         cases[TREE] = _as_many(cases[POLICY], results)
         if beam:
@@ -75,13 +77,15 @@ def _at(case: Case, target: str) -> Case:
     return Case(**{**vars(case), "target": target})
 
 
-def _cases(targets: Sequence[str], w_sc: float, faces: str, weights: str) -> dict[str, list[Case]]:
+def _cases(targets: Sequence[str], w_sc: float, faces: str, weights: str, other: str = "") -> dict[str, list[Case]]:
     def of(agent: str, refits: int | None = None, **options: object) -> list[Case]:
         return [with_options(Case(t, agent, w_sc, refits=refits, faces=faces), **options) for t in targets]
 
+    others = {OTHER: of("maskable-ppo", weights=other)} if other else {}
     return {
         RECTANGLE: of("mcts", 1, **TREE_ALONE),
         POLICY: of("maskable-ppo", weights=weights),
+        **others,
         CHOICE + ", one pass": of("choice-prior", **TREE_ALONE, n_simulations=1),
     }
 

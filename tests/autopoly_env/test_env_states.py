@@ -6,8 +6,10 @@ import subprocess
 import sys
 
 import gymnasium
+import numpy as np
 import pytest
 
+from autopoly_env.errors import ConfigError
 from autopoly_env.targets import split_seed
 from tests.helpers.environments import SMALL, begun, make, play, same
 from tests.helpers.paths import ROOT
@@ -76,3 +78,33 @@ def test_split__decides_which_targets_are_drawn() -> None:
     names = {split: make(split=split).reset(seed=1)[1]["target"] for split in ("train", "test")}
     seeds = {split: int(name.split("_")[1]) for split, name in names.items()}
     assert seeds["train"] < split_seed("test", 0) <= seeds["test"]
+
+
+# --- masks that are not exact, prices that change
+
+
+def test_mask_that_is_not_exact__has_all_legal_actions_and_what_has_no_room_does_nothing() -> None:
+    rules = {"operators": "full", "faces": "quads", "reward_mode": "improvement"}
+    exact, quick = make(**rules), make(**rules, exact_mask=False)
+    mask = exact.reset(seed=3)[1]["action_mask"]
+    wider = quick.reset(seed=3)[1]["action_mask"]
+    assert (wider >= mask).all() and wider.sum() > mask.sum()
+    before = quick.unwrapped.state
+    refused = int(np.flatnonzero(wider > mask)[0])
+    _, reward, _, _, info = quick.step(refused)
+    assert reward == 0.0 and not info["invalid_action"] and not info["action_mask"][refused]
+    assert quick.unwrapped.state.mesh is before.mesh and quick.unwrapped.state.step == before.step + 1
+
+
+def test_price__counts_from_the_next_reset_on() -> None:
+    env = make(w_sc=1.0)
+    first = env.reset(seed=5)[1]
+    kept = env.unwrapped.clone_state()
+    env.unwrapped.set_price(0.25)
+    again = env.reset(seed=5)[1]
+    assert again["r_all"] == pytest.approx(first["r_all"] + 0.75 * float(first["r_sc"]))
+    assert env.unwrapped.simulator.weights.w_sc == 0.25
+    with pytest.raises(ConfigError, match=r"w_sc=1\.0, this one has 0\.25"):
+        env.unwrapped.restore_state(kept)
+    with pytest.raises(ConfigError):
+        env.unwrapped.set_price(-1.0)
