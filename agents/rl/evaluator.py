@@ -41,7 +41,7 @@ class RlEvaluator(BatchedEvaluator[FloatArray]):
             return -np.inf
 
     def _evaluate(self, simulator: Simulator, states: Sequence[State]) -> Iterable[FloatArray]:
-        return self._player.logits([simulator] * len(states), states)
+        return self._player.logits([simulator] * len(states), states, exact=False)
 
     def _fits(self, state: State) -> bool:
         return self._player.fits(state)

@@ -269,14 +269,14 @@ def test_command__says_in_one_line_what_is_wrong(
     assert len(lines) == 1 and complaint in lines[0]
 
 
-@pytest.mark.parametrize("name", [*ALGORITHMS, "clone"])
+@pytest.mark.parametrize("name", [*ALGORITHMS, "both", "clone", "clone_both"])
 def test_shipped_config__can_be_read_and_begins_with_its_command(name: str) -> None:
     path = ROOT / "configs" / "train" / f"{name}.yaml"
-    script, default = ("rl_clone", CloneConfig()) if name == "clone" else ("train_rl", TrainRlConfig())
+    script, default = ("rl_clone", CloneConfig()) if "clone" in name else ("train_rl", TrainRlConfig())
     assert path.read_text().startswith(f"# python -m training.{script} --config configs/train/{name}.yaml: ")
     read = read_config(path, [], default)  # type: ignore[type-var]
     if isinstance(read, TrainRlConfig):
-        assert read.algorithm == name
+        assert read.algorithm == ("maskable_ppo" if name == "both" else name)
 
 
 # --- examination ---
