@@ -49,8 +49,8 @@ metrics are of. No picture from outside was used.
 |---|---|
 {rows}
 
-**Limits.** Pictures of {meta.spec.get("obs_resolution")} pixels a side do not show details below two pixels. The price
-of an element is an input, but only the prices above were trained. After {meta.spec.get("max_steps")} steps it stops.
+**Limits.** Pictures of {meta.spec.get("obs_resolution")} pixels a side do not show details below two pixels. Rules of
+faces and prices that are not among those above are refused. After {meta.spec.get("max_steps")} steps it stops.
 
 **Settings.** In the `.json` beside the weights, under `training`.
 """
