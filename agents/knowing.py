@@ -40,6 +40,15 @@ class Known:
                 f"these weights know {', '.join(self.classes)}, none of which is an operator here: give others"
             )
 
+    def shared_with(self, other: "Known") -> "Known":
+        """The rules and prices that both know, and the actions that either does."""
+        rules = tuple(rule for rule in self.rules if rule in other.rules) if self.rules and other.rules else ()
+        if self.w_sc is None or other.w_sc is None:
+            w_sc = self.w_sc or other.w_sc
+        else:
+            w_sc = max(self.w_sc[0], other.w_sc[0]), min(self.w_sc[1], other.w_sc[1])
+        return Known(tuple(dict.fromkeys((*self.classes, *other.classes))), rules or self.rules or other.rules, w_sc)
+
     def unknown(self, simulator: Simulator) -> list[str]:
         """The simulator's operators that they do not know: their actions come last."""
         return [name for name in simulator.operators if not set(operator_named(name).classes) & set(self.classes)]

@@ -36,6 +36,7 @@ _OURS = {
     "nfap-prior, tree alone": Learner("nfap-prior", TREE_ALONE, _BY_ONE),
     "choice-prior, tree alone": Learner("choice-prior", TREE_ALONE, _SAME),
     "choice-prior, tree alone, on the plain tree": Learner("choice-prior", TREE_ALONE, _TREE),
+    "choice-prior with nfap, tree alone": Learner("choice-prior", TREE_ALONE | {"with_nfap": True}, _SAME),
 }
 PAPER = _OURS | {
     "nfap-mcts": Learner("nfap-mcts", {}, _TREE, ends_by_itself=True),
@@ -46,6 +47,7 @@ PAPER = _OURS | {
 }
 MODELLER = _OURS | {
     "beam, as long as it takes": Learner("beam", {"width": 8}, takes_what_it_needs=True, ends_by_itself=True),
+    "nfap-prior, tree alone, as choice-prior": Learner("nfap-prior", _CHOICE, _SAME),
     "choice-prior, one pass": Learner("choice-prior", _ONE_PASS, "beam, as long as it takes", ends_by_itself=True),
     "quads": Learner("quads"),
     "choice-prior": Learner("choice-prior", {}, "quads"),

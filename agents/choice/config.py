@@ -50,6 +50,8 @@ class ChoicePriorConfig(MctsConfig):
     tree_share: float = 0.5
     prior: Literal["choice"] = "choice"  # type: ignore[assignment]
     weights: str = ""  # a .safetensors file; empty for the one that comes with the project
+    with_nfap: bool = False  # the prior is the geometric mean of ChoiceNet's and nFAP-Net's, which needs torch
+    nfap_weights: str = ""  # of nFAP-Net, as `weights`
     temperature: float = 1.0  # of the prior: above 1 it is flatter
 
     def __post_init__(self) -> None:

@@ -86,13 +86,19 @@ class NfapMctsAgent(KnowingAgent):
 
 def nfap_prior(config: NfapPriorConfig, incumbents: Sequence[Agent] = ()) -> Agent:
     """The agent of a config; `incumbents` are the agents that it names as seeds. Raises ConfigError as `load_nfap`."""
-    _require_torch("nfap-prior")
+    evaluator = nfap_evaluator("nfap-prior", config.nfap_weights, config.temperature, config.n)
+    return NfapPriorAgent(config, incumbents, evaluator)
+
+
+def nfap_evaluator(agent: str, weights: str, temperature: float, n: int | None = None) -> "NfapEvaluator":
+    """nFAP-Net's priors for the agent of that name. Raises ConfigError as `load_nfap`, and where torch is missing."""
+    _require_torch(agent)
     from agents.guided.evaluator import NfapEvaluator
     from agents.guided.weights import load_nfap
 
-    net, meta = load_nfap(config.nfap_weights)
-    _check_n(config, net.config.n)
-    return NfapPriorAgent(config, incumbents, NfapEvaluator(net, meta, config.temperature))
+    net, meta = load_nfap(weights)
+    _check_n(net.config.n if n is None else n, net.config.n)
+    return NfapEvaluator(net, meta, temperature)
 
 
 def nfap_mcts(config: NfapMctsConfig) -> Agent:
@@ -102,7 +108,7 @@ def nfap_mcts(config: NfapMctsConfig) -> Agent:
     from agents.guided.weights import load_nfap, load_warpnet
 
     net, meta = load_nfap(config.nfap_weights)
-    _check_n(config, net.config.n)
+    _check_n(config.n, net.config.n)
     placed = config.start == "placed"
     if config.geometry == "quick":
         return NfapMctsAgent(config, QuickEvaluator(net, meta, config.temperature, placed))
@@ -118,8 +124,6 @@ def _require_torch(name: str) -> None:
     torch.set_num_threads(n_threads())
 
 
-def _check_n(config: NfapPriorConfig, n: int) -> None:
-    if config.n != n:
-        raise ConfigError(
-            f"n = {config.n}: the weights foresee {n} stages; give n={n} or the weights of another network"
-        )
+def _check_n(given: int, n: int) -> None:
+    if given != n:
+        raise ConfigError(f"n = {given}: the weights foresee {n} stages; give n={n} or the weights of another network")

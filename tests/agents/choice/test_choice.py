@@ -17,6 +17,7 @@ from agents.choice.config import ChoiceConfig, classes_of
 from agents.choice.features import N_NUMBERS, look
 from agents.choice.network import batch_of, choose, gains
 from agents.choice.weights import load_choice
+from agents.knowing import Known
 from agents.registry import make_agent
 from agents.search.config import MctsConfig
 from agents.search.evaluator import ResidualEvaluator
@@ -264,3 +265,35 @@ def test_agent__needs_neither_torch_nor_safetensors(tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert float(done.stdout) > 0.0
+
+
+# --- with nFAP-Net ---
+
+
+def test_joint_prior__is_the_geometric_mean_of_the_two() -> None:
+    game = quads_game()
+    state = game.initial()
+    actions = game.legal_actions(state)[1:]
+    choice, nfap = (make_agent(name)._evaluator for name in ("choice-prior", "nfap-prior"))  # type: ignore[attr-defined]
+    joint = make_agent("choice-prior", with_nfap=True)._evaluator  # type: ignore[attr-defined]
+    one, other, both = (evaluator.prior(game, state, actions) for evaluator in (choice, nfap, joint))
+    assert both.sum() == pytest.approx(1.0)
+    ratios = both**2 / (one * other)
+    assert ratios == pytest.approx(np.full(len(actions), ratios[0]), rel=1e-9)
+    assert np.abs(one - other).max() > 0.05  # they are not of one mind
+
+
+def test_joint_prior__knows_what_both_know() -> None:
+    one = Known(("edge_cap", "edge_fill"), ("any", "quads"), (0.1, 1.0))
+    other = Known(("edge_fill", "face_delete"), ("quads",), (0.3, 1.5))
+    assert one.shared_with(other) == Known(("edge_cap", "edge_fill", "face_delete"), ("quads",), (0.3, 1.0))
+    silent = Known(("face_delete",), (), None)
+    assert one.shared_with(silent) == Known(("edge_cap", "edge_fill", "face_delete"), one.rules, one.w_sc)
+
+
+def test_joint_prior__refuses_what_either_refuses() -> None:
+    agent = make_agent("choice-prior", with_nfap=True)
+    game = Simulator(painted(BOTTLE), operators="modeller", faces="quads", weights=ScoreWeights(w_sc=2.0))
+    with pytest.raises(ConfigError, match=r"these weights know w_sc 0\.1 to 1\.5, not 2"):
+        agent.solve(game, Budget(20))
+    assert_consistent(agent.solve(quads_game(), Budget(60)), quads_game())
