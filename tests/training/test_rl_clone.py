@@ -71,7 +71,7 @@ def test_sample__has_the_gains_at_its_price(trajectory: Trajectory, shards: Path
     one = prepared(trajectory, settings.env.spec())[0]
     for w_sc in (0.3, 1.0):
         sample = clone_sample(one, w_sc, 0, settings)
-        gains = LabelConfig(w_sc=w_sc).gains(one.state)
+        gains = LabelConfig().gains(one.state, w_sc)
         for action, gain, number in zip(one.state.actions, gains, one.index, strict=True):
             assert sample["action_mask"][number] == 1, action
             if np.isfinite(gain):
@@ -200,5 +200,3 @@ def test_clone_of_a_rule_that_no_course_has__is_refused(shards: Path, tmp_path: 
     assert clone_config(folder, BOTH).price("quads", np.random.default_rng(0)) > 0.1
     with pytest.raises(ConfigError, match=r"env\.courses: none has faces=quads"):
         CloneTask(clone_config(folder)).stream[0]
-    with pytest.raises(ConfigError, match="faces=quads: expected source=teacher or search, and traced=0"):
-        SourceConfig(faces="quads")
