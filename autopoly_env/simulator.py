@@ -14,7 +14,7 @@ import numpy as np
 import shapely
 
 from autopoly_env.arguments import number, whole
-from autopoly_env.arrays import BoolArray, FloatArray
+from autopoly_env.arrays import BoolArray, FloatArray, read_only
 from autopoly_env.compute import Job, Routine, map_threads, run, run_all
 from autopoly_env.details import Details, hairlines
 from autopoly_env.errors import ConfigError, IllegalActionError, MeshError
@@ -41,6 +41,7 @@ from autopoly_env.score import Score, ScoreWeights, iou_of, score, score_of
 from autopoly_env.sequence import ConstructionSequence
 from autopoly_env.sequence.lesson import share_moved
 from autopoly_env.silhouette import SMALL, Silhouette
+from autopoly_env.silhouette.target_kernels import row_ends
 
 POLISH_RESOLUTION = 512  # of the finest refit; a score may be finer
 MANY_VERTICES = 150  # of a mesh, above which it is not searched or tuned vertex by vertex: that takes minutes
@@ -194,8 +195,7 @@ class Simulator:
         filled = target.mask if target.mask.any() else target.coverage > 0.0
         if target.weights is not None and (filled & (target.weights > 0.0)).any():  # of what matters at all
             filled = filled & (target.weights > 0.0)
-        rows = np.flatnonzero(filled.any(axis=1))
-        first, last = filled[rows].argmax(axis=1), size - 1 - filled[rows, ::-1].argmax(axis=1)
+        rows, first, last = row_ends(read_only(filled)).T
         x0, x1, y0, y1 = first.min() / size, (last.max() + 1) / size, rows[0] / size, (rows[-1] + 1) / size
         axis = self.guidance.axis
         if axis is not None:

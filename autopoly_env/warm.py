@@ -56,6 +56,7 @@ with _leaving_at_ctrl_c(__name__ == "__main__"):
     from autopoly_env.refit import RefitTarget, mended, refit, tune
     from autopoly_env.score import ScoreWeights, score
     from autopoly_env.silhouette import Silhouette
+    from autopoly_env.silhouette.target_kernels import row_ends
     from autopoly_env.targets import ConstructionTargets
 
 PARTS = {  # the longest first; those of the agents are named only, for this package knows none of them
@@ -191,6 +192,7 @@ def pictures() -> None:
     """Renderings, scores, the last touch, and what rendering and target disagree about."""
     mesh, silhouette = PolyMesh.rectangle(0.2, 0.2, 0.8, 0.7), _frame()
     target = silhouette.target(32)
+    row_ends(target.mask)
     coverage(mesh, 32)
     coverage_many([mesh, mesh], 32)
     loss_and_gradient(mesh, target)

@@ -51,7 +51,8 @@ def chord_errors(points: FloatArray, longest: int) -> FloatArray:
     """
     n = points.shape[0]
     errors, ring = np.full((n, n + 1), np.inf), np.empty((n + 1, 2))
-    ring[:n], ring[n] = points, points[0]  # for a remainder takes as long as the rest of a step
+    for k in range(n + 1):  # once, for a remainder takes as long as the rest of a step
+        ring[k, 0], ring[k, 1] = points[k % n, 0], points[k % n, 1]
     for i in range(n):
         for j in range(i + 1, min(n, i + longest) + 1):
             ax, ay = ring[i, 0], ring[i, 1]

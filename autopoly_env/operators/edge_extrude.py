@@ -14,7 +14,7 @@ from autopoly_env.operators.elements import EDGE
 from autopoly_env.operators.evidence import Evidence, missing_mass, sane_move
 from autopoly_env.operators.mirroring import again, moved
 from autopoly_env.operators.operator import Mirroring, Operator
-from autopoly_env.operators.rebuilding import ends_along_face, grown, refusal
+from autopoly_env.operators.rebuilding import edited, ends_along_face, grown, refusal
 from autopoly_env.operators.wording import Gesture, Phrases, begun_with
 
 _LEAST_WIDTH = 0.1  # of the edge's length, of an extrusion that is stretched to what is missing
@@ -34,7 +34,8 @@ def extrude(mesh: PolyMesh, edge: int, _choice: Choice | None) -> PolyMesh:
         raise refusal("edge_extrude", "edge", edge, "it lies between two faces; choose a boundary edge")
     a, b = ends_along_face(mesh, edge)
     points = np.array(edit_kernels.extrusion(mesh.vertices, mesh.edges, a, b)).reshape(2, 2)
-    return grown(mesh, points, edit_kernels.extruded(mesh.topology.packed, len(mesh.vertex_ids), edge), 1)
+    packed, _ = edited(mesh, edit_kernels.EXTRUDE, edge)
+    return grown(mesh, points, packed, 1)
 
 
 def _begin(evidence: Evidence, edge: int) -> Iterator[Start]:

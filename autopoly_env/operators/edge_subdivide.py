@@ -14,7 +14,7 @@ from autopoly_env.operators.elements import EDGE
 from autopoly_env.operators.evidence import Evidence, sane_move
 from autopoly_env.operators.mirroring import again, moved
 from autopoly_env.operators.operator import Mirroring, Operator
-from autopoly_env.operators.rebuilding import ends_along_face, grown
+from autopoly_env.operators.rebuilding import edited, ends_along_face, grown
 from autopoly_env.operators.wording import Gesture, Phrases, Told, begun_with
 
 
@@ -25,8 +25,8 @@ def any_edge(mesh: PolyMesh) -> BoolArray:
 
 def subdivide(mesh: PolyMesh, edge: int, _choice: Choice | None) -> PolyMesh:
     """A new vertex at the midpoint of the edge; the faces beside it keep their other corners."""
-    faces = edit_kernels.subdivided(mesh.topology.packed, len(mesh.vertex_ids), edge)
-    return grown(mesh, _middle(mesh, edge)[None], faces)
+    packed, _ = edited(mesh, edit_kernels.SUBDIVIDE, edge)
+    return grown(mesh, _middle(mesh, edge)[None], packed)
 
 
 def _middle(mesh: PolyMesh, edge: int) -> FloatArray:

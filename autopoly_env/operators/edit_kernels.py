@@ -9,45 +9,19 @@ import numpy as np
 from autopoly_env.arrays import BoolArray, FloatArray, IntArray
 from autopoly_env.compute import kernel, uncounted_kernel
 from autopoly_env.mesh.planar_kernels import clear_extrusion
-from autopoly_env.mesh.topology_kernels import links_in, packed_links
+from autopoly_env.mesh.topology_kernels import Links, links_in, packed_links
+from autopoly_env.operators.hole_kernels import HOLE_SIDES
 
+SUBDIVIDE, EXTRUDE, DELETE, DISSOLVE, SPLIT, HOLE = range(6)  # what an edit does
 OFFSET = 0.25  # of the edge's length, of an extrusion
 INSET = 0.25
 MAX_HALVINGS = 12
-
-
-@kernel
-def subdivided(packed: IntArray, n_vertices: int, edge: int) -> IntArray:
-    """Vertex number V after the tail of each half-edge of an edge."""
-    links = links_in(packed)
-    first, second = links.sides[edge, 0], links.sides[edge, 1]
-    n_new = 1 if second < 0 else 2
-    corners, offsets = np.empty(len(links.corners) + n_new, np.int64), np.empty(len(links.offsets), np.int64)
-    end = 0
-    for f in range(len(links.offsets) - 1):
-        offsets[f] = end
-        for h in range(links.offsets[f], links.offsets[f + 1]):
-            corners[end] = links.corners[h]
-            end += 1
-            if h == first or h == second:
-                corners[end] = n_vertices
-                end += 1
-    offsets[len(offsets) - 1] = end
-    return packed_links(corners, offsets, n_vertices + 1)
-
-
-@kernel
-def extruded(packed: IntArray, n_vertices: int, edge: int) -> IntArray:
-    """A face (b, a, V, V + 1) more on the edge a-b, as its lower face runs."""
-    links = links_in(packed)
-    side = links.sides[edge, 0]
-    part = np.array((links.half_edges[side, 1], links.half_edges[side, 0], n_vertices, n_vertices + 1))
-    return _with_face(links.corners, links.offsets, part, n_vertices + 2)
+_MOST_NEW = 16  # corners that an edit brings, at most: a hole of four has twelve
 
 
 @uncounted_kernel
 def extrusion(points: FloatArray, edges: IntArray, a: int, b: int) -> tuple[float, float, float, float]:
-    """Where vertices V and V + 1 of `extruded` begin: (x, y, x, y), outside of edge a-b and parallel to it.
+    """Where vertices V and V + 1 of an extrusion begin: (x, y, x, y), outside of edge a-b and parallel to it.
 
     They stand off by `OFFSET` of the edge's length, halved up to `MAX_HALVINGS` times while the new face meets another
     of the `edges` (E, 2), be it straight or narrowed by `INSET` of the edge's length at either end.
@@ -60,95 +34,148 @@ def extrusion(points: FloatArray, edges: IntArray, a: int, b: int) -> tuple[floa
 
 
 @kernel
-def split(packed: IntArray, n_vertices: int, corner: int, other: int) -> IntArray:
-    """The face of two corners (= half-edges) cut between them; the part without its last half-edge is the last face."""
+def edited(packed: IntArray, n_vertices: int, edit: int, element: int, ends: IntArray) -> tuple[IntArray, IntArray]:
+    """The topology after an edit, and which vertex each of its own was; new ones count on from V.
+
+    One kernel for all, for each that Python calls is a file to be loaded. `element` is the operator's, as in Python;
+    `ends` (1,) the other corner of a split, (4,) of a hole its bridges, see `_holed`.
+    """
     links = links_in(packed)
-    low, high = min(corner, other), max(corner, other)
-    kept, offsets = np.empty(len(links.corners) - (high - low - 1), np.int64), links.offsets.copy()
-    end = 0
-    for h in range(len(links.corners)):
-        if h <= low or h >= high:
-            kept[end] = links.corners[h]
+    corners, offsets = np.empty(len(links.corners) + _MOST_NEW, np.int64), np.empty(len(links.offsets) + 1, np.int64)
+    n, n_faces = n_vertices, len(links.offsets) - 1
+    if edit == SUBDIVIDE:
+        _subdivided(links, n, element, corners, offsets)
+        n += 1
+    elif edit == EXTRUDE:
+        _extruded(links, n, element, corners, offsets)
+        n, n_faces = n + 2, n_faces + 1
+    elif edit == HOLE:
+        n_sides = HOLE_SIDES[element % len(HOLE_SIDES)]
+        _holed(links, n, element // len(HOLE_SIDES), n_sides, ends, corners, offsets)
+        n, n_faces = n + n_sides, n_faces + 1
+    elif edit == SPLIT:
+        _split(links, element, ends[0], corners, offsets)
+        n_faces += 1
+    elif edit == DELETE:
+        _without(links, links.offsets[element], links.offsets[element + 1], corners, offsets)
+        for f in range(element, n_faces):  # the face that is left without corners
+            offsets[f] = offsets[f + 1]
+        n_faces -= 1
+    else:
+        corner = lone_corners(packed, n_vertices)[element]
+        _without(links, corner, corner + 1, corners, offsets)
+    kept = np.arange(n)
+    if edit == DELETE or edit == DISSOLVE:
+        n = _renumber(corners, offsets[n_faces], kept)
+    return packed_links(corners[: offsets[n_faces]], offsets[: n_faces + 1], n), kept[:n].copy()
+
+
+@uncounted_kernel
+def _subdivided(links: Links, n_vertices: int, edge: int, corners: IntArray, offsets: IntArray) -> None:
+    """Vertex number V after the tail of each half-edge of an edge."""
+    first, second, end = links.sides[edge, 0], links.sides[edge, 1], 0
+    for f in range(len(links.offsets) - 1):
+        offsets[f] = end
+        for h in range(links.offsets[f], links.offsets[f + 1]):
+            corners[end] = links.corners[h]
             end += 1
-    for f in range(links.owners[corner] + 1, len(offsets)):
-        offsets[f] -= high - low - 1
-    return _with_face(kept, offsets, links.corners[low : high + 1], n_vertices)
+            if h == first or h == second:
+                corners[end] = n_vertices
+                end += 1
+    offsets[len(links.offsets) - 1] = end
 
 
-@kernel
-def holed(packed: IntArray, n_vertices: int, face: int, n_sides: int, bridges: IntArray) -> IntArray:
+@uncounted_kernel
+def _extruded(links: Links, n_vertices: int, edge: int, corners: IntArray, offsets: IntArray) -> None:
+    """A face (b, a, V, V + 1) more on the edge a-b, as its lower face runs."""
+    side, n = links.sides[edge, 0], len(links.corners)
+    for h in range(n):
+        corners[h] = links.corners[h]
+    for f in range(len(links.offsets)):
+        offsets[f] = links.offsets[f]
+    corners[n], corners[n + 1] = links.half_edges[side, 1], links.half_edges[side, 0]
+    corners[n + 2], corners[n + 3] = n_vertices, n_vertices + 1
+    offsets[len(links.offsets)] = n + 4
+
+
+@uncounted_kernel
+def _split(links: Links, corner: int, other: int, corners: IntArray, offsets: IntArray) -> None:
+    """The face of two corners (= half-edges) cut between them; the part without its last half-edge is the last face."""
+    low, high = min(corner, other), max(corner, other)
+    _without(links, low + 1, high, corners, offsets)
+    n_faces = len(links.offsets) - 1
+    end = offsets[n_faces]
+    for h in range(low, high + 1):
+        corners[end] = links.corners[h]
+        end += 1
+    offsets[n_faces + 1] = end
+
+
+@uncounted_kernel
+def _holed(
+    links: Links, n_vertices: int, face: int, n_sides: int, bridges: IntArray, corners: IntArray, offsets: IntArray
+) -> None:
     """A face cut in two around a hole with the corners V, V + 1, ...; the part that has its last half-edge stays.
 
     `bridges` (4,) are two pairs (position in the face, position in the hole), by the first of them.
     """
-    links = links_in(packed)
-    begin = links.offsets[face]
-    i, h, j, k = bridges[0], bridges[1], bridges[2], bridges[3]
-    there, back = (h - k) % n_sides + 1, (k - h) % n_sides + 1  # corners of the hole on the way to the other bridge
-    inner = np.empty(there + back, np.int64)
-    for step in range(there):
-        inner[step] = n_vertices + (h - step) % n_sides
-    for step in range(back):
-        inner[there + step] = n_vertices + (k - step) % n_sides
-    kept = np.concatenate((links.corners[: begin + i + 1], inner[:there], links.corners[begin + j :]))
-    offsets = links.offsets.copy()
-    for f in range(face + 1, len(offsets)):
-        offsets[f] += there - (j - i - 1)
-    part = np.concatenate((links.corners[begin + i : begin + j + 1], inner[there:]))
-    return _with_face(kept, offsets, part, n_vertices + n_sides)
+    begin, n_faces, end = links.offsets[face], len(links.offsets) - 1, 0
+    i, h, j, k = begin + bridges[0], bridges[1], begin + bridges[2], bridges[3]
+    for f in range(n_faces):
+        offsets[f] = end
+        for corner in range(links.offsets[f], links.offsets[f + 1]):
+            if f != face or corner <= i or corner >= j:
+                corners[end] = links.corners[corner]
+                end += 1
+            if corner == i:
+                end = _around(n_vertices, n_sides, h, k, corners, end)
+    offsets[n_faces] = end
+    for corner in range(i, j + 1):
+        corners[end] = links.corners[corner]
+        end += 1
+    offsets[n_faces + 1] = _around(n_vertices, n_sides, k, h, corners, end)
 
 
-@kernel
-def without_face(packed: IntArray, n_vertices: int, face: int) -> tuple[IntArray, IntArray]:
-    """One face less, and which vertices are left, ascending: those that no face has any more are gone."""
-    links = links_in(packed)
-    first, last = links.offsets[face], links.offsets[face + 1]
-    corners, offsets = np.empty(len(links.corners) - (last - first), np.int64), links.offsets[1:].copy()
+@uncounted_kernel
+def _around(n_vertices: int, n_sides: int, first: int, last: int, corners: IntArray, end: int) -> int:
+    """Append the hole's corners from one down to another, against its winding; where they end."""
+    for step in range((first - last) % n_sides + 1):
+        corners[end] = n_vertices + (first - step) % n_sides
+        end += 1
+    return end
+
+
+@uncounted_kernel
+def _without(links: Links, first: int, last: int, corners: IntArray, offsets: IntArray) -> None:
+    """All faces without the corners first..last-1, which are those of one face."""
     end = 0
-    for h in range(len(links.corners)):
-        if h < first or h >= last:
-            corners[end] = links.corners[h]
-            end += 1
-    for f in range(len(offsets)):
-        offsets[f] = links.offsets[f] if f <= face else links.offsets[f + 1] - (last - first)
-    return _renumbered(corners, offsets, n_vertices)
+    for f in range(len(links.offsets) - 1):
+        offsets[f] = end
+        for h in range(links.offsets[f], links.offsets[f + 1]):
+            if h < first or h >= last:
+                corners[end] = links.corners[h]
+                end += 1
+    offsets[len(links.offsets) - 1] = end
 
 
-@kernel
-def without_corner(packed: IntArray, n_vertices: int, corner: int) -> tuple[IntArray, IntArray]:
-    """A face's corner (= half-edge) less, and which vertices are left, as for `without_face`."""
-    links = links_in(packed)
-    corners, offsets = np.empty(len(links.corners) - 1, np.int64), links.offsets.copy()
-    for h in range(len(corners)):
-        corners[h] = links.corners[h if h < corner else h + 1]
-    for f in range(links.owners[corner] + 1, len(offsets)):
-        offsets[f] -= 1
-    return _renumbered(corners, offsets, n_vertices)
-
-
-@kernel
-def _with_face(corners: IntArray, offsets: IntArray, part: IntArray, n_vertices: int) -> IntArray:
-    n = len(corners)
-    more, ends = np.empty(n + len(part), np.int64), np.empty(len(offsets) + 1, np.int64)
-    more[:n], more[n:] = corners, part
-    ends[: len(offsets)] = offsets
-    ends[len(offsets)] = len(more)
-    return packed_links(more, ends, n_vertices)
-
-
-@kernel
-def _renumbered(corners: IntArray, offsets: IntArray, n_vertices: int) -> tuple[IntArray, IntArray]:
-    number, kept, n_kept = np.full(n_vertices, -1, np.int64), np.empty(n_vertices, np.int64), 0
-    for v in corners:
-        number[v] = 0
-    for v in range(n_vertices):
-        if number[v] == 0:
-            number[v] = n_kept
-            kept[n_kept] = v
+@uncounted_kernel
+def _renumber(corners: IntArray, n_corners: int, kept: IntArray) -> int:
+    """Leave out the vertices that no corner has any more; write those that are left to `kept`, and say how many."""
+    for v in range(len(kept)):
+        kept[v] = -1
+    for h in range(n_corners):
+        kept[corners[h]] = 0
+    n_kept = 0
+    for v in range(len(kept)):
+        if kept[v] == 0:
+            kept[v] = n_kept
             n_kept += 1
-    for h in range(len(corners)):
-        corners[h] = number[corners[h]]
-    return packed_links(corners, offsets, n_kept), kept[:n_kept].copy()
+    for h in range(n_corners):
+        corners[h] = kept[corners[h]]
+    for v in range(len(kept)):
+        if kept[v] >= 0:
+            kept[kept[v]] = v  # which is no further on, so that none is overwritten that is still to be read
+    return n_kept
 
 
 @kernel

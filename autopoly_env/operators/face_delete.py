@@ -13,7 +13,7 @@ from autopoly_env.operators.deeds import NOTHING, Press, select
 from autopoly_env.operators.elements import FACE
 from autopoly_env.operators.mirroring import again
 from autopoly_env.operators.operator import Mirroring, Operator
-from autopoly_env.operators.rebuilding import refusal, shrunk_to, without
+from autopoly_env.operators.rebuilding import edited, refusal, shrunk_to, without
 from autopoly_env.operators.wording import Gesture, Phrases, Told, begun_with, count
 
 
@@ -26,8 +26,7 @@ def delete(mesh: PolyMesh, face: int, _choice: Choice | None) -> PolyMesh:
     """The mesh without the face, and without the edges and vertices that had no other."""
     if len(mesh.face_ids) == 1:
         raise refusal("face_delete", "face", face, "it is the only face; a mesh keeps at least one")
-    packed, kept = edit_kernels.without_face(mesh.topology.packed, len(mesh.vertex_ids), face)
-    return shrunk_to(mesh, packed, kept, without(mesh.face_ids, face))
+    return shrunk_to(mesh, *edited(mesh, edit_kernels.DELETE, face), without(mesh.face_ids, face))
 
 
 def _mirror(of: Mirroring, start: Start) -> Iterator[Start]:

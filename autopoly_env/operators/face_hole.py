@@ -18,7 +18,7 @@ from autopoly_env.operators.hole_kernels import HOLE_SIDES, TINY_AREA, roomy_fac
 from autopoly_env.operators.holes import HoleChoice, default_hole, hole_defect, plan_hole
 from autopoly_env.operators.mirroring import again
 from autopoly_env.operators.operator import Mirroring, Operator
-from autopoly_env.operators.rebuilding import corners_from_last, grown, refusal
+from autopoly_env.operators.rebuilding import corners_from_last, edited, grown, refusal
 from autopoly_env.operators.wording import Gesture, Phrases, Told
 
 _RIM_PROMISE = 0.1  # of an excess that an edge answers for, left to a hole
@@ -53,8 +53,8 @@ def cut(mesh: PolyMesh, element: int, choice: Choice | None) -> PolyMesh:
     defect = hole_defect(mesh.vertices[list(face)], choice)
     if defect is not None:
         raise refusal("face_hole", "hole", element, f"{defect}; give points and bridges from plan_hole")
-    bridges = np.array(sorted(choice.bridges)).ravel()
-    packed = edit_kernels.holed(mesh.topology.packed, len(mesh.vertex_ids), f, n_sides, bridges)
+    (i, h), (j, k) = sorted(choice.bridges)
+    packed, _ = edited(mesh, edit_kernels.HOLE, element, i, h, j, k)
     return grown(mesh, choice.points, packed, 1)
 
 

@@ -13,7 +13,7 @@ from autopoly_env.operators.choices import TO_CORNER
 from autopoly_env.operators.deeds import Press, select
 from autopoly_env.operators.elements import CORNER
 from autopoly_env.operators.operator import Operator
-from autopoly_env.operators.rebuilding import corner_of, corners_from_last, grown, refusal
+from autopoly_env.operators.rebuilding import corner_of, corners_from_last, edited, grown, refusal
 from autopoly_env.operators.wording import Gesture, Phrases, Told
 
 
@@ -63,7 +63,8 @@ def split(mesh: PolyMesh, corner: int, choice: Choice | None) -> PolyMesh:
             corner,
             f"the way to corner {choice} is no free diagonal of its face; choose another",
         )
-    return grown(mesh, (), edit_kernels.split(mesh.topology.packed, len(mesh.vertex_ids), corner, int(choice)), 1)
+    packed, _ = edited(mesh, edit_kernels.SPLIT, corner, int(choice))
+    return grown(mesh, (), packed, 1)
 
 
 def _inner(_mesh: PolyMesh, _corner: int) -> bool:

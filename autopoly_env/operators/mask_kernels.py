@@ -46,15 +46,18 @@ def legal(points: FloatArray, packed: IntArray, table: IntArray, most: IntArray,
 def _masked(points: FloatArray, packed: IntArray, rule: int) -> BoolArray:
     """The mask of the vertices, edges, faces or corners."""
     links = links_in(packed)
-    if rule == ALL_EDGES:
-        return np.ones(len(links.edges), np.bool_)
-    if rule == RIM_EDGES:
-        return links.sides[:, 1] < 0
+    if rule == ALL_EDGES or rule == RIM_EDGES:
+        mask = np.empty(len(links.edges), np.bool_)
+        for e in range(len(mask)):
+            mask[e] = rule == ALL_EDGES or links.sides[e, 1] < 0
+        return mask
     if rule == JOINABLE_EDGES:
         return joinable(packed)
     if rule == SPARE_FACES:
-        n_faces = len(links.offsets) - 1
-        return np.full(n_faces, n_faces > 1)
+        mask = np.empty(len(links.offsets) - 1, np.bool_)
+        for f in range(len(mask)):
+            mask[f] = len(mask) > 1
+        return mask
     if rule == ROOMY_FACES:
         return roomy_faces(points, links.corners, links.offsets, TINY_AREA)
     if rule == SPLITTABLE_CORNERS:

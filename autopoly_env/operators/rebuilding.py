@@ -9,6 +9,7 @@ import numpy as np
 from autopoly_env.arrays import FloatArray, IntArray
 from autopoly_env.errors import IllegalActionError
 from autopoly_env.mesh import Face, PolyMesh, Topology
+from autopoly_env.operators import edit_kernels
 
 _Item = TypeVar("_Item")
 
@@ -37,6 +38,14 @@ def grown(
         new_id + len(points),
         new_face + n_new_faces,
     )
+
+
+def edited(mesh: PolyMesh, edit: int, element: int, *ends: int) -> tuple[IntArray, IntArray]:
+    """`edit_kernels.edited` of a mesh."""
+    found: tuple[IntArray, IntArray] = edit_kernels.edited(
+        mesh.topology.packed, len(mesh.vertex_ids), edit, element, np.array(ends, np.int64)
+    )
+    return found
 
 
 def shrunk(mesh: PolyMesh, faces: Sequence[Face], face_ids: tuple[int, ...]) -> PolyMesh:

@@ -11,7 +11,7 @@ from autopoly_env.operators.deeds import NOTHING, Press, select
 from autopoly_env.operators.elements import VERTEX
 from autopoly_env.operators.mirroring import again
 from autopoly_env.operators.operator import Mirroring, Operator
-from autopoly_env.operators.rebuilding import corner_of, refusal, shrunk_to
+from autopoly_env.operators.rebuilding import corner_of, edited, refusal, shrunk_to
 from autopoly_env.operators.wording import Gesture, Phrases, begun_with
 
 
@@ -40,9 +40,7 @@ def dissolve(mesh: PolyMesh, vertex: int, _choice: Choice | None) -> PolyMesh:
     defect = _defect(mesh, vertex)
     if defect is not None:
         raise refusal("vertex_dissolve", "vertex", vertex, defect)
-    topology = mesh.topology
-    packed, kept = edit_kernels.without_corner(topology.packed, topology.n_vertices, topology.lone_corner(vertex))
-    return shrunk_to(mesh, packed, kept, mesh.face_ids)
+    return shrunk_to(mesh, *edited(mesh, edit_kernels.DISSOLVE, vertex), mesh.face_ids)
 
 
 def _mirror(of: Mirroring, start: Start) -> Iterator[Start]:

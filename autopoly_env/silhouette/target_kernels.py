@@ -5,7 +5,7 @@ Letters: N pixels a side of the mask, R cells a side.
 
 import numpy as np
 
-from autopoly_env.arrays import BoolArray, FloatArray
+from autopoly_env.arrays import BoolArray, FloatArray, IntArray
 from autopoly_env.compute import kernel
 
 
@@ -17,6 +17,8 @@ def area_average(mask: BoolArray, resolution: int) -> FloatArray:
     whole numbers: a cell that is half object is exactly 0.5.
     """
     n = len(mask)
+    if n % resolution == 0:
+        return _block_average(mask, n // resolution)
     sums, along, average = np.zeros(resolution, np.int64), np.empty(n, np.int64), np.empty((resolution, resolution))
     for row in range(resolution):
         along[:] = 0
@@ -32,6 +34,39 @@ def area_average(mask: BoolArray, resolution: int) -> FloatArray:
                 sums[column] += (min(right, (x + 1) * resolution) - max(left, x * resolution)) * along[x]
             average[row, column] = sums[column] / (n * n)
     return average
+
+
+@kernel
+def _block_average(mask: BoolArray, side: int) -> FloatArray:
+    """`area_average` where every cell is so many whole pixels a side."""
+    resolution = len(mask) // side
+    average, sums = np.empty((resolution, resolution)), np.empty(resolution, np.int64)
+    for row in range(resolution):
+        sums[:] = 0
+        for y in range(row * side, (row + 1) * side):
+            for column in range(resolution):
+                for x in range(column * side, (column + 1) * side):
+                    sums[column] += mask[y, x]
+        for column in range(resolution):
+            average[row, column] = sums[column] / (side * side)
+    return average
+
+
+@kernel
+def row_ends(filled: BoolArray) -> IntArray:
+    """(n, 3) each row of (R, R) in which something is true, and the first and the last column there."""
+    size = len(filled)
+    ends, n = np.empty((size, 3), np.int64), 0
+    for row in range(size):
+        first, last = -1, -1
+        for column in range(size):
+            if filled[row, column]:
+                first = column if first < 0 else first
+                last = column
+        if last >= 0:
+            ends[n, 0], ends[n, 1], ends[n, 2] = row, first, last
+            n += 1
+    return ends[:n].copy()
 
 
 @kernel

@@ -13,11 +13,12 @@ import numpy as np
 from autopoly_env.arrays import FloatArray, IntArray
 from autopoly_env.mesh import PolyMesh, Topology
 from autopoly_env.operators import HOLE_SIDES, OPERATORS, Action, Choice, HoleChoice
+from autopoly_env.operators.edit_kernels import DELETE, DISSOLVE, EXTRUDE, HOLE, SPLIT, SUBDIVIDE
 from autopoly_env.raster import workspace
 from autopoly_env.targets import growth_kernels
 from autopoly_env.targets.construction_kernels import Limits
 from autopoly_env.targets.dice import Dice
-from autopoly_env.targets.growth_kernels import DELETE, DISSOLVE, EXTRUDE, HOLE, MORE_DRAWS, SPLIT, STUCK, SUBDIVIDE
+from autopoly_env.targets.growth_kernels import MORE_DRAWS, STUCK
 
 # What can change the outline by itself. `face_split` cannot: it comes with a `face_delete` of one of the two parts.
 OUTLINE_OPERATORS = ("edge_subdivide", "edge_extrude", "face_delete", "face_hole", "vertex_dissolve")

@@ -13,21 +13,20 @@ from autopoly_env.compute import kernel, uncounted_kernel
 from autopoly_env.mesh.planar_kernels import ring_of, split_imbalance, splittable_corners
 from autopoly_env.mesh.topology_kernels import links_in
 from autopoly_env.operators.edit_kernels import (
+    DELETE,
+    DISSOLVE,
+    EXTRUDE,
+    HOLE,
+    SPLIT,
+    SUBDIVIDE,
     dissolvable,
-    extruded,
+    edited,
     extrusion,
-    holed,
-    lone_corners,
-    split,
-    subdivided,
-    without_corner,
-    without_face,
 )
 from autopoly_env.operators.hole_kernels import HOLE_SIDES, TINY_AREA, plan_bridges, roomy_faces
 from autopoly_env.raster.raster_kernels import Workspace
 from autopoly_env.targets.construction_kernels import Limits, clearance, is_sound
 
-SUBDIVIDE, EXTRUDE, DELETE, DISSOLVE, SPLIT, HOLE = range(6)  # what an action does
 N_DRAWS = 40  # actions drawn for a change before the construction is given up
 N_SHAKES = 6  # random translations tried for an action, each a little smaller
 N_POINTS = 12  # tried for the middle of a hole
@@ -133,7 +132,7 @@ def _step(
         n_used += n_drawn
         if not fits:
             return Step(n_used, failed, packed)
-    made, kept = _edited(packed, n, action, bridges)
+    made, kept = edited(packed, n, kind, element, bridges if kind == HOLE else action[OTHER:])
     if _is_among(outlines, made):
         return Step(n_used, failed, packed)
     begun = np.empty((len(kept), 2))
@@ -273,24 +272,6 @@ def _plan(
         hole[k, 0], hole[k, 1] = x + radius * np.cos(angle), y + radius * np.sin(angle)
     fits = plan_bridges(ring, hole[:n_sides], bridges)
     return fits, 2 * N_POINTS + 2
-
-
-@kernel
-def _edited(packed: IntArray, n: int, action: IntArray, bridges: IntArray) -> tuple[IntArray, IntArray]:
-    """The topology after an action, and which vertex (V,) each of its own was; new ones count on from `n`."""
-    kind, element = action[KIND], action[ELEMENT]
-    if kind == DELETE:
-        return without_face(packed, n, element)
-    if kind == DISSOLVE:
-        return without_corner(packed, n, lone_corners(packed, n)[element])
-    if kind == SUBDIVIDE:
-        return subdivided(packed, n, element), np.arange(n + 1)
-    if kind == EXTRUDE:
-        return extruded(packed, n, element), np.arange(n + 2)
-    if kind == HOLE:
-        n_sides = HOLE_SIDES[element % 2]
-        return holed(packed, n, element // 2, n_sides, bridges), np.arange(n + n_sides)
-    return split(packed, n, element, action[OTHER]), np.arange(n)
 
 
 @kernel
