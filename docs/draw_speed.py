@@ -42,7 +42,11 @@ TIMED = {
         ("autopoly_env.simulator", "", "Disagreement"),
         ("autopoly_env.env", "", "describe"),
     ],
-    "around refits": [("autopoly_env.simulator", "", "refit"), ("autopoly_env.simulator", "Simulator", "refit_target")],
+    "around refits": [
+        ("autopoly_env.simulator", "", "refit"),
+        ("autopoly_env.simulator", "", "refit_best"),  # of builds that have it
+        ("autopoly_env.simulator", "Simulator", "refit_target"),
+    ],
     "legal mask": [("autopoly_env.operators", "ActionCodec", "legal_mask")],
     "observation": [("autopoly_env.observation", "Observer", "observe")],
     "score, defects": [("autopoly_env.simulator", "", "score"), ("autopoly_env.simulator", "", "defects_of")],
@@ -80,7 +84,8 @@ class Clock:
             for module_name, class_name, name in places:
                 home = import_module(module_name)
                 home = getattr(home, class_name) if class_name else home
-                setattr(home, name, self.timed(getattr(home, name), part))
+                if hasattr(home, name):
+                    setattr(home, name, self.timed(getattr(home, name), part))
 
 
 def measure() -> dict[str, float]:
