@@ -29,7 +29,7 @@ def legal(points: FloatArray, packed: IntArray, table: IntArray, most: IntArray,
     links = links_in(packed)
     counts = (len(points), len(links.edges), len(links.offsets) - 1)
     for k in range(len(table)):
-        found = _masked(points, packed, table[k, RULE])
+        found = masked(points, packed, table[k, RULE])
         n_each = table[k, N_EACH]
         for place in range(len(found)):
             for i in range(n_each):
@@ -43,7 +43,7 @@ def legal(points: FloatArray, packed: IntArray, table: IntArray, most: IntArray,
 
 
 @kernel
-def _masked(points: FloatArray, packed: IntArray, rule: int) -> BoolArray:
+def masked(points: FloatArray, packed: IntArray, rule: int) -> BoolArray:
     """The mask of the vertices, edges, faces or corners."""
     links = links_in(packed)
     if rule == ALL_EDGES or rule == RIM_EDGES:

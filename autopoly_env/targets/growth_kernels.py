@@ -10,23 +10,32 @@ import numpy as np
 
 from autopoly_env.arrays import BoolArray, FloatArray, IntArray
 from autopoly_env.compute import kernel, uncounted_kernel
-from autopoly_env.mesh.planar_kernels import ring_of, split_imbalance, splittable_corners
+from autopoly_env.mesh.planar_kernels import ring_of, split_imbalance
 from autopoly_env.mesh.topology_kernels import links_in
 from autopoly_env.operators.edit_kernels import (
     DELETE,
-    DISSOLVE,
     EXTRUDE,
     HOLE,
     SPLIT,
     SUBDIVIDE,
-    dissolvable,
     edited,
     extrusion,
 )
-from autopoly_env.operators.hole_kernels import HOLE_SIDES, TINY_AREA, plan_bridges, roomy_faces
+from autopoly_env.operators.hole_kernels import HOLE_SIDES, plan_bridges
+from autopoly_env.operators.mask_kernels import (
+    ALL_EDGES,
+    DISSOLVABLE_VERTICES,
+    RIM_EDGES,
+    ROOMY_FACES,
+    SPARE_FACES,
+    SPLITTABLE_CORNERS,
+    masked,
+)
 from autopoly_env.raster.raster_kernels import Workspace
 from autopoly_env.targets.construction_kernels import Limits, clearance, is_sound
 
+# Where each edit works, in the order of their numbers
+_RULES = (ALL_EDGES, RIM_EDGES, SPARE_FACES, DISSOLVABLE_VERTICES, SPLITTABLE_CORNERS, ROOMY_FACES)
 N_DRAWS = 40  # actions drawn for a change before the construction is given up
 N_SHAKES = 6  # random translations tried for an action, each a little smaller
 N_POINTS = 12  # tried for the middle of a hole
@@ -201,22 +210,13 @@ def _is_among(outlines: IntArray, packed: IntArray) -> bool:
 @kernel
 def _legal(points: FloatArray, packed: IntArray, kind: int) -> IntArray:
     """The elements that an action of a kind may work on, ascending."""
-    links = links_in(packed)
-    if kind == SPLIT:
-        return _where(splittable_corners(points, links.corners, links.offsets, links.edges))
-    if kind == DISSOLVE:
-        return _where(dissolvable(packed, len(points)))
-    if kind == DELETE:
-        return np.arange(len(links.offsets) - 1 if len(links.offsets) > 2 else 0)
-    if kind == EXTRUDE:
-        return _where(links.sides[:, 1] < 0)
-    if kind == HOLE:
-        roomy = _where(roomy_faces(points, links.corners, links.offsets, TINY_AREA))
-        legal = np.empty(2 * len(roomy), np.int64)
-        for k in range(len(roomy)):
-            legal[2 * k], legal[2 * k + 1] = 2 * roomy[k], 2 * roomy[k] + 1
-        return legal
-    return np.arange(len(links.edges))
+    places = _where(masked(points, packed, _RULES[kind]))
+    if kind != HOLE:
+        return places
+    legal = np.empty(len(HOLE_SIDES) * len(places), np.int64)
+    for k in range(len(legal)):
+        legal[k] = len(HOLE_SIDES) * places[k // len(HOLE_SIDES)] + k % len(HOLE_SIDES)
+    return legal
 
 
 @kernel
