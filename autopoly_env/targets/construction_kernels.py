@@ -5,10 +5,11 @@ from typing import NamedTuple
 import numpy as np
 
 from autopoly_env.arrays import FloatArray, IntArray
-from autopoly_env.compute import kernel, uncounted_kernel
+from autopoly_env.compute import kernel
 from autopoly_env.mesh.geometry_kernels import orientation
 from autopoly_env.mesh.topology_kernels import links_in
 from autopoly_env.raster.raster_kernels import Workspace, coverage_image
+from autopoly_env.silhouette.area_kernels import label_areas
 
 _SLACK = 1e-9  # by which a pixel's coverage may round to more than all of it
 
@@ -74,35 +75,8 @@ def shows_all(points: FloatArray, packed: IntArray, work: Workspace, image: Floa
 @kernel
 def n_regions(image: FloatArray) -> int:
     """How many 4-connected regions of pixels there are that are all covered by half or more, or all by less."""
-    size = len(image)
-    parents, labels = np.empty(size * size, np.int64), np.empty(size, np.int64)  # of the pixels of the last row
-    n_labels, n_joined = 0, 0
-    for row in range(size):
-        for column in range(size):
-            inside = image[row, column] >= 0.5
-            label = -1
-            if row > 0 and (image[row - 1, column] >= 0.5) == inside:
-                label = _root(parents, labels[column])
-            if column > 0 and (image[row, column - 1] >= 0.5) == inside:
-                left = _root(parents, labels[column - 1])
-                if label >= 0 and label != left:
-                    parents[label] = left
-                    n_joined += 1
-                label = left
-            if label < 0:
-                label = n_labels
-                parents[label] = label
-                n_labels += 1
-            labels[column] = label
-    return n_labels - n_joined
-
-
-@uncounted_kernel
-def _root(parents: IntArray, label: int) -> int:
-    while parents[label] != label:
-        parents[label] = parents[parents[label]]
-        label = parents[label]
-    return label
+    inside = image >= 0.5
+    return label_areas(inside, False)[1] + label_areas(~inside, False)[1]
 
 
 @kernel
