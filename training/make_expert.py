@@ -106,8 +106,6 @@ def _claim(folder: Path, meta: dict[str, Any]) -> None:
         return
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         raise ConfigError(f"cannot read {path}; give another folder, or delete this one") from None
-    if isinstance(known, dict) and isinstance(known.get("source"), dict):
-        known["source"] = {"faces": "any"} | known["source"]  # which folders of before there were rules do not say
     if known != meta:
         raise ConfigError(f"{folder} holds shards made with other settings (meta.json); give another folder")
 
