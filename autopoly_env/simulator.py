@@ -515,7 +515,7 @@ def _of_one_topology(starts: Sequence[Start]) -> list[list[Start]]:
 
 def _quad(corners: FloatArray) -> PolyMesh:
     """A mesh of one quad, which is known to be sound; `corners` (4, 2)."""
-    return PolyMesh(corners, _QUAD, (0, 1, 2, 3), (0,), 4, 1)
+    return PolyMesh.numbered(corners, _QUAD)
 
 
 def _places_on_border(mesh: PolyMesh, vertex: int) -> Iterator[FloatArray]:

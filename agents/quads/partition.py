@@ -108,9 +108,8 @@ def bent(mesh: PolyMesh, bonds: Bonds | None = None) -> PolyMesh | None:
 
 def mesh_of(outline: Outline, partition: Partition) -> PolyMesh:
     """The outline as a mesh of the partition's faces."""
-    n, f = len(outline.loops.vertices), len(partition.faces)
-    topology = Topology(n, partition.faces)
-    return PolyMesh(outline.loops.vertices, topology, tuple(range(n)), tuple(range(f)), n, f)
+    points = outline.loops.vertices
+    return PolyMesh.numbered(points, Topology(len(points), partition.faces))
 
 
 def _ways_to_walk(points: FloatArray, around: Face, holes: Sequence[Face]) -> list[_Way]:

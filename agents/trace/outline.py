@@ -27,9 +27,7 @@ class Outline:
     def loops(self) -> PolyMesh:
         """The rings as the faces of a mesh, holes wound backwards: its rendering is that of the shape."""
         cycles = _cycles(tuple(len(ring.points) for ring in self.rings))
-        n, f = cycles.n_vertices, cycles.n_faces
-        points = np.concatenate([ring.points for ring in self.rings])
-        return PolyMesh(points, cycles, tuple(range(n)), tuple(range(f)), n, f)
+        return PolyMesh.numbered(np.concatenate([ring.points for ring in self.rings]), cycles)
 
     def shape(self) -> PolyMesh:
         """`loops`, as budgets show what was found."""

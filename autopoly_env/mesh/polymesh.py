@@ -65,10 +65,15 @@ class PolyMesh:
         """
         points = _as_points(vertices)
         cycles = tuple(tuple(int(v) for v in face) for face in faces)
-        n, f = len(points), len(cycles)
-        mesh = cls(points, Topology(n, cycles), tuple(range(n)), tuple(range(f)), n, f)
+        mesh = cls.numbered(points, Topology(len(points), cycles))
         validate(mesh)
         return mesh
+
+    @classmethod
+    def numbered(cls, vertices: FloatArray, topology: Topology) -> "PolyMesh":
+        """The mesh of `vertices` (V,2) and a topology with ids 0, 1, ..., unchecked."""
+        n, f = topology.n_vertices, topology.n_faces
+        return cls(vertices, topology, tuple(range(n)), tuple(range(f)), n, f)
 
     @classmethod
     def rectangle(cls, x0: float, y0: float, x1: float, y1: float) -> "PolyMesh":

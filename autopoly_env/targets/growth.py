@@ -72,30 +72,28 @@ class Growth(NamedTuple):
     @property
     def first(self) -> PolyMesh:
         """The rectangle."""
-        return PolyMesh(self.start, _QUAD, (0, 1, 2, 3), (0,), 4, 1)
+        return PolyMesh.numbered(self.start, _QUAD)
 
     @property
     def last(self) -> PolyMesh:
         """The shape in the end, its vertices and faces named by their numbers."""
         begin = self.ends[-2] if len(self.ends) > 1 else 0
         points = self.places[begin:]
-        topology = Topology.of_packed(len(points), self.packed)
-        n, f = len(points), topology.n_faces
-        return PolyMesh(points, topology, tuple(range(n)), tuple(range(f)), n, f)
+        return PolyMesh.numbered(points, Topology.of_packed(len(points), self.packed))
 
     def told(self) -> Iterator[Grown]:
         """Step by step, done by the operators."""
         mesh = self.first
         for k, (begin, end) in enumerate(pairwise((0, *self.ends.tolist()))):
             kind, element, other = self.steps[k].tolist()
-            action, choice = Action(_NAMES[kind], element), self._choice(k) if kind == HOLE else other
-            if kind not in (HOLE, SPLIT):
-                choice = None
+            action, choice = Action(_NAMES[kind], element), None if other < 0 else other
+            if kind == HOLE:
+                choice = self._hole(k)
             made = OPERATORS[action.operator].apply(mesh, element, choice)
             mesh = made.with_vertices(self.places[begin:end])
             yield Grown(action, choice, mesh)
 
-    def _choice(self, k: int) -> HoleChoice:
+    def _hole(self, k: int) -> HoleChoice:
         n_sides = HOLE_SIDES[self.steps[k, growth_kernels.ELEMENT] % len(HOLE_SIDES)]
         f, h, g, i = self.bridges[k].tolist()
         return HoleChoice(tuple((x, y) for x, y in self.holes[k, :n_sides].tolist()), ((f, h), (g, i)))

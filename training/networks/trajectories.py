@@ -133,10 +133,9 @@ class Shard:
         corners = self.arrays["corners"][cuts[0] : cuts[-1]].tolist()
         ends = (cuts - cuts[0]).tolist()
         faces = tuple(tuple(corners[a:b]) for a, b in pairwise(ends))
-        n, f = v1 - v0, f1 - f0
         points = self.arrays["vertices"][v0:v1].astype(np.float64)
         return Labelled(
-            PolyMesh(points, Topology(n, faces), tuple(range(n)), tuple(range(f)), n, f),
+            PolyMesh.numbered(points, Topology(len(points), faces)),
             self.arrays["scores"][k].astype(np.float32),
             tuple(Action(_NAMES[code], element) for code, element in self.arrays["actions"][a0:a1].tolist()),
             self.arrays["outcomes"][a0:a1].astype(np.float32),
